@@ -6,19 +6,13 @@ use std::fs;
 use std::path::PathBuf;
 
 use crate::papers::{table, text};
-use crate::tree::{root, rust_files};
+use crate::tree::{module_file, rust_files};
 
 /// The rows of the table: name, limit, effect beyond it, constant.
 fn rows() -> Vec<Vec<String>> {
-    let rows = table(
-        &text("docs/protocol.md"),
-        "what | limit | beyond it | constant",
-    );
-    assert!(
-        (20..=35).contains(&rows.len()),
-        "the table of limits has {} rows",
-        rows.len()
-    );
+    let header = "what | limit | beyond it | constant";
+    let rows = table(&text("docs/protocol.md"), header);
+    assert!((20..=35).contains(&rows.len()), "{} limits", rows.len());
     rows
 }
 
@@ -26,13 +20,8 @@ fn rows() -> Vec<Vec<String>> {
 fn place(row: &[String]) -> (String, String) {
     let path = row[3].trim_matches('`');
     let (module, name) = path.rsplit_once("::").unwrap();
-    let module = module.replace("::", "/");
-    let files = [format!("src/{module}.rs"), format!("src/{module}/mod.rs")];
-    let file = files.into_iter().find(|file| root().join(file).exists());
-    (
-        file.unwrap_or_else(|| panic!("{path}: no such module")),
-        name.to_owned(),
-    )
+    let file = module_file(module).unwrap_or_else(|| panic!("{path}: no such module"));
+    (file, name.to_owned())
 }
 
 /// The right side of a constant's definition.
@@ -62,42 +51,31 @@ fn value(expression: &str, source: &str) -> f64 {
         return number;
     }
     let name = expression.rsplit("::").next().unwrap();
-    let here = definition(source, name).map(|right| (right, source.to_owned()));
-    let elsewhere = || {
-        let mut found = rust_files("src")
-            .into_iter()
-            .map(|path| fs::read_to_string(path).unwrap());
-        found.find_map(|source| Some((definition(&source, name)?, source)))
-    };
-    let (right, source) = here
-        .or_else(elsewhere)
-        .unwrap_or_else(|| panic!("{expression}?"));
+    let files = rust_files("src").into_iter().map(fs::read_to_string);
+    let mut sources = std::iter::once(source.to_owned()).chain(files.map(Result::unwrap));
+    let found = sources.find_map(|source| Some((definition(&source, name)?, source)));
+    let (right, source) = found.unwrap_or_else(|| panic!("{expression}?"));
     value(&right, &source)
 }
 
 /// Values as the table says them: numbers with units, added up.
 fn said(limit: &str) -> f64 {
-    limit
-        .split(" + ")
-        .map(|part| {
-            let (number, unit) = part.split_once(' ').unwrap_or((part, ""));
-            let number: f64 = number
-                .replace(',', "")
-                .parse()
-                .unwrap_or_else(|_| panic!("{limit}?"));
-            number
-                * match unit {
-                    "" | "byte" | "bytes" | "s" => 1.0,
-                    "KiB" => 1024.0,
-                    "MiB" => 1024.0 * 1024.0,
-                    "GiB" => 1024.0 * 1024.0 * 1024.0,
-                    "ms" => 1e-3,
-                    "h" => 3600.0,
-                    "days" => 24.0 * 3600.0,
-                    _ => panic!("{limit}: unit?"),
-                }
-        })
-        .sum()
+    let part = |part: &str| {
+        let (number, unit) = part.split_once(' ').unwrap_or((part, ""));
+        let number: Result<f64, _> = number.replace(',', "").parse();
+        let unit = match unit {
+            "" | "byte" | "bytes" | "s" => 1.0,
+            "KiB" => 1024.0,
+            "MiB" => 1024.0 * 1024.0,
+            "GiB" => 1024.0 * 1024.0 * 1024.0,
+            "ms" => 1e-3,
+            "h" => 3600.0,
+            "days" => 24.0 * 3600.0,
+            _ => panic!("{limit}: unit?"),
+        };
+        unit * number.unwrap_or_else(|_| panic!("{limit}?"))
+    };
+    limit.split(" + ").map(part).sum()
 }
 
 fn names(code: &str, name: &str) -> bool {
@@ -114,32 +92,25 @@ fn every_limit_of_the_paper_is_a_constant_of_that_value() {
         let source = text(&file);
         let right = definition(&source, &name).unwrap_or_else(|| panic!("{file}: no {name}"));
         let (found, said) = (value(&right, &source), said(&row[1]));
-        assert!(
-            (found - said).abs() <= 1e-9 * said,
-            "{name} is {found}, the table says {said}"
-        );
+        let is_said = (found - said).abs() <= 1e-9 * said;
+        assert!(is_said, "{name} is {found}, the table says {said}");
     }
 }
 
 #[test]
 fn every_limit_of_the_paper_has_a_test_that_names_it() {
-    let mut tests: Vec<(PathBuf, String)> = Vec::new();
-    for path in rust_files("tests") {
-        // This file reads names only from the table.
-        tests.push((path.clone(), fs::read_to_string(&path).unwrap()));
-    }
+    // This file reads names only from the table.
+    let read = |path: &PathBuf| fs::read_to_string(path).unwrap();
+    let mut tests: Vec<String> = rust_files("tests").iter().map(read).collect();
     for path in rust_files("src") {
-        let source = fs::read_to_string(&path).unwrap();
+        let source = read(&path);
         if path.ends_with("tests.rs") {
-            tests.push((path, source));
+            tests.push(source);
         } else if let Some((_, unit_tests)) = source.split_once("#[cfg(test)]\nmod tests") {
-            tests.push((path, unit_tests.to_owned()));
+            tests.push(unit_tests.to_owned());
         }
     }
-    let missing: Vec<String> = rows()
-        .iter()
-        .map(|row| place(row).1)
-        .filter(|name| !tests.iter().any(|(_, code)| names(code, name)))
-        .collect();
+    let mut missing: Vec<String> = rows().iter().map(|row| place(row).1).collect();
+    missing.retain(|name| !tests.iter().any(|code| names(code, name)));
     assert!(missing.is_empty(), "no test names {missing:?}");
 }

@@ -2,9 +2,11 @@
 //!
 //! **Invariant:** code, tables and headings are not sentences. Every other sentence of the tree is counted.
 
+use std::ffi::OsStr;
 use std::fs;
+use std::path::PathBuf;
 
-use crate::tree::{files, root};
+use crate::tree::{files_in, root};
 
 /// Longest sentence, in words. A piece of code counts as one.
 const MAX_WORDS: usize = 30;
@@ -18,14 +20,14 @@ type Paragraph = (usize, String);
 fn comment<'a>(line: &'a str, mark: &str) -> Option<&'a str> {
     let line = line.trim();
     if mark == "//" {
-        let block = ["/**", "*/", "*"]
-            .iter()
-            .find_map(|start| line.strip_prefix(start));
-        let body = line
-            .strip_prefix("//")
-            .map(|body| body.trim_start_matches(['/', '!']))
-            .or(block);
-        return body.map(|body| body.trim().trim_end_matches("*/").trim());
+        let mut marks = ["//!", "///", "//", "/**", "*/", "*"].iter();
+        let body = marks.find_map(|start| line.strip_prefix(start))?;
+        return Some(
+            body.trim_start_matches(['/', '!'])
+                .trim()
+                .trim_end_matches("*/")
+                .trim(),
+        );
     }
     let body = line.strip_prefix('#').filter(|body| !body.starts_with('!'));
     body.map(|body| body.trim_start_matches('#').trim())
@@ -99,11 +101,9 @@ fn sentences(paragraph: &str) -> Vec<String> {
         sentence.push_str(word);
         sentence.push(' ');
         let ends = word.trim_end_matches([')', '"', '\'', '*']);
-        let next = words
-            .get(place + 1)
-            .map(|next| next.trim_start_matches(['(', '"', '\'', '*', '[', '_']));
-        let begins =
-            next.is_some_and(|next| next.starts_with(char::is_uppercase) || next.starts_with("x"));
+        let next = words.get(place + 1).copied().unwrap_or_default();
+        let next = next.trim_start_matches(['(', '"', '\'', '*', '[', '_']);
+        let begins = next.starts_with(char::is_uppercase) || next.starts_with('x');
         if ends.ends_with(['.', '!', '?']) && begins {
             found.push(String::new());
         }
@@ -134,30 +134,20 @@ fn a_long_sentence_is_found_and_no_code() {
         let sentences = found
             .iter()
             .flat_map(|(_, one)| sentences(&without_code(one)));
-        assert_eq!(
-            sentences.filter(|one| is_long(one)).count(),
-            count,
-            "{text}"
-        );
+        let long = sentences.filter(|one| is_long(one)).count();
+        assert_eq!(long, count, "{text}");
     }
 }
 
 #[test]
 fn few_sentences_are_long() {
     let (mut count, mut found) = (0, Vec::new());
-    for path in files(root()) {
-        let extension = path
-            .extension()
-            .and_then(|one| one.to_str())
-            .unwrap_or_default();
-        // The kept report is made by the program, whose sentences are counted in its source.
-        let is_made = path.starts_with(root().join("docs/report"));
-        if !["md", "rs", "js", "mjs", "py", "sh", "toml"].contains(&extension) || is_made {
-            continue;
-        }
-        let Ok(text) = fs::read_to_string(&path) else {
-            continue;
-        };
+    // The kept report is made by the program, whose sentences are counted in its source.
+    let is_made = |path: &PathBuf| path.starts_with(root().join("docs/report"));
+    let written = files_in("", &["md", "rs", "js", "mjs", "py", "sh", "toml"]);
+    for path in written.into_iter().filter(|path| !is_made(path)) {
+        let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default();
+        let text = fs::read_to_string(&path).unwrap();
         for (line, paragraph) in paragraphs(&text, extension) {
             for sentence in sentences(&without_code(&paragraph)) {
                 count += 1;
@@ -168,10 +158,10 @@ fn few_sentences_are_long() {
             }
         }
     }
-    assert!(
-        found.len() <= count / ONE_IN,
+    let told = format!(
         "{} of {count} sentences:\n{}",
         found.len(),
         found.join("\n")
     );
+    assert!(found.len() <= count / ONE_IN, "{told}");
 }

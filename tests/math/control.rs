@@ -1,66 +1,22 @@
 //! The control law: its terms, its integral, its state, and the discrete loop in 50 digits.
 
-use pendularm::math::arm::{Arm, State};
-use pendularm::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
+use pendularm::math::arm::State;
+use pendularm::math::pid::{INTEGRAL_LIMIT, Pid, Setpoint};
 use pendularm::math::simulation::Simulation;
-use serde::Deserialize;
+use serde_json::Value;
 
-/// One closed loop of the oracle, per sample `k`: state after `k` steps, integral and effort of step `k`.
-#[derive(Deserialize)]
-struct Case {
-    name: String,
-    n: usize,
-    masses: Vec<f64>,
-    lengths: Vec<f64>,
-    gravity: f64,
-    q0: Vec<f64>,
-    qdot0: Vec<f64>,
-    setpoint: Vec<f64>,
-    setpoint_vel: Vec<f64>,
-    kp: Vec<f64>,
-    ki: Vec<f64>,
-    kd: Vec<f64>,
-    dt: f64,
-    method: String,
-    samples: Vec<u64>,
-    q: Vec<Vec<f64>>,
-    qdot: Vec<Vec<f64>>,
-    integral: Vec<Vec<f64>>,
-    tau: Vec<Vec<f64>>,
-    float64_diff: Vec<f64>,
-}
+use crate::stored::{arm, array, entries, for_links, gains, list, method, number, start};
 
-#[derive(Deserialize)]
-struct Oracle {
-    cases: Vec<Case>,
-}
-
-fn oracle() -> Vec<Case> {
-    let oracle: Oracle = serde_json::from_str(include_str!("../data/closed_loop.json")).unwrap();
-    oracle.cases
-}
-
-fn array<const N: usize>(values: &[f64]) -> [f64; N] {
-    values.try_into().unwrap()
-}
-
-fn simulation<const N: usize>(case: &Case) -> Simulation<N> {
-    let arm = Arm::new(array(&case.lengths), array(&case.masses), case.gravity).unwrap();
-    let gains = Gains {
-        kp: array(&case.kp),
-        ki: array(&case.ki),
-        kd: array(&case.kd),
-    };
-    let mut simulation = Simulation::new(arm, gains);
-    simulation.set_method(case.method.parse().unwrap());
-    simulation.set_timestep(case.dt);
-    simulation.set_state(State {
-        position: array(&case.q0),
-        velocity: array(&case.qdot0),
-    });
+/// A closed loop of the oracle at its start.
+fn simulation<const N: usize>(case: &Value) -> Simulation<N> {
+    let [kp, ki, kd] = ["kp", "ki", "kd"].map(|name| array(&case[name]));
+    let mut simulation = Simulation::new(arm(case), gains(kp, ki, kd));
+    simulation.set_method(method(case));
+    simulation.set_timestep(number(&case["dt"]));
+    simulation.set_state(start(case));
     simulation.set_setpoint(Setpoint {
-        position: array(&case.setpoint),
-        velocity: array(&case.setpoint_vel),
+        position: array(&case["setpoint"]),
+        velocity: array(&case["setpoint_vel"]),
     });
     simulation.enable(true);
     simulation
@@ -68,60 +24,42 @@ fn simulation<const N: usize>(case: &Case) -> Simulation<N> {
 
 #[test]
 fn the_closed_loop_agrees_with_50_digits_at_every_sample() {
-    for case in oracle() {
-        match case.n {
-            2 => check_loop::<2>(&case),
-            3 => check_loop::<3>(&case),
-            n => panic!("{n} links"),
-        }
+    for case in entries(include_str!("../data/closed_loop.json"), "cases") {
+        for_links!(case, check_loop(&case));
     }
 }
 
-fn check_loop<const N: usize>(case: &Case) {
+/// Per sample `k` the oracle has the state after `k` steps, and the integral and the effort of step `k`.
+fn check_loop<const N: usize>(case: &Value) {
     let mut simulation = simulation::<N>(case);
-    for (k, &sample) in case.samples.iter().enumerate() {
-        simulation.advance(sample - simulation.steps());
-        assert_eq!(simulation.steps(), sample);
+    for (k, sample) in list(&case["samples"]).into_iter().enumerate() {
+        simulation.advance(sample as u64 - simulation.steps());
+        assert_eq!(simulation.steps(), sample as u64);
         // The oracle's tolerance: a hundred times the error of a plain float64 run of the same loop, at least 1e-12.
-        let tolerance = (100.0 * case.float64_diff[k]).max(1e-12);
+        let tolerance = (100.0 * number(&case["float64_diff"][k])).max(1e-12);
         // An error of the state becomes an effort by way of the gains.
-        let gain = (0..N).map(|i| case.kp[i] + case.ki[i] + case.kd[i]);
+        let gain = |i: usize| ["kp", "ki", "kd"].map(|name| number(&case[name][i]));
+        let gain = (0..N).map(|i| gain(i).iter().sum());
         let effort_tolerance = tolerance * gain.fold(1.0, f64::max);
-        for (name, got, want, tolerance) in [
-            ("q", &simulation.state().position, &case.q[k], tolerance),
-            ("qd", &simulation.state().velocity, &case.qdot[k], tolerance),
-            (
-                "integral",
-                simulation.pid().integral(),
-                &case.integral[k],
-                tolerance,
-            ),
-            (
-                "effort",
-                simulation.effort(),
-                &case.tau[k],
-                effort_tolerance,
-            ),
+        let (state, integral) = (simulation.state(), simulation.pid().integral());
+        for (name, got, tolerance) in [
+            ("q", &state.position, tolerance),
+            ("qdot", &state.velocity, tolerance),
+            ("integral", integral, tolerance),
+            ("tau", simulation.effort(), effort_tolerance),
         ] {
+            let want = array::<N>(&case[name][k]);
             for i in 0..N {
                 let off = (got[i] - want[i]).abs();
-                assert!(
-                    off <= tolerance * want[i].abs().max(1.0),
-                    "{} n={N} {name}[{i}] at step {sample}: {} off by {off}",
-                    case.name,
-                    got[i],
-                );
+                let told = format!("{} n={N} {name}[{i}] at step {sample}", case["name"]);
+                assert!(off <= tolerance * want[i].abs().max(1.0), "{told}: {off}");
             }
         }
     }
 }
 
 fn pid() -> Pid<2> {
-    let mut pid = Pid::new(Gains {
-        kp: [4.0, 8.0],
-        ki: [16.0, 2.0],
-        kd: [0.5, 1.0],
-    });
+    let mut pid = Pid::new(gains([4.0, 8.0], [16.0, 2.0], [0.5, 1.0]));
     pid.set_setpoint(Setpoint {
         position: [1.0, -2.0],
         velocity: [0.25, 0.0],
@@ -142,35 +80,20 @@ fn the_integral_stops_at_its_limit_and_comes_back_from_it_at_once() {
         pid.commit(pid.control(&AT, 1.0).integral);
     }
     assert_eq!(pid.integral(), &[INTEGRAL_LIMIT, -INTEGRAL_LIMIT]);
-    let beyond = State {
-        position: [2.0, -3.0],
-        velocity: [0.0; 2],
-    };
+    let beyond = State::at_rest([2.0, -3.0]);
     pid.commit(pid.control(&beyond, 1.0).integral);
-    assert_eq!(
-        pid.integral(),
-        &[INTEGRAL_LIMIT - 1.0, 1.0 - INTEGRAL_LIMIT]
-    );
+    let back = INTEGRAL_LIMIT - 1.0;
+    assert_eq!(pid.integral(), &[back, -back]);
 }
 
 #[test]
-fn enabling_what_is_enabled_changes_nothing() {
+fn gains_a_setpoint_and_enabling_what_is_enabled_keep_the_integral() {
     let mut pid = pid();
     pid.commit([3.0, -4.0]);
     let before = pid.clone();
     pid.enable(true);
     assert_eq!(pid, before);
-}
-
-#[test]
-fn changing_gains_or_setpoint_keeps_the_integral() {
-    let mut pid = pid();
-    pid.commit([3.0, -4.0]);
-    pid.set_gains(Gains {
-        kp: [1.0; 2],
-        ki: [1.0; 2],
-        kd: [1.0; 2],
-    });
+    pid.set_gains(gains([1.0; 2], [1.0; 2], [1.0; 2]));
     assert_eq!(pid.integral(), &[3.0, -4.0]);
     let setpoint = Setpoint {
         position: [0.5, 1.0],

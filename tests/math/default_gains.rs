@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::gravity_load;
 use pendularm::math::integrator::Method;
+use pendularm::math::kinematics::forward;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 
@@ -16,29 +17,16 @@ const SETTLING: f64 = 4.0;
 /// Time for which it must stay there \[s\].
 const STAYING: f64 = 4.0;
 
-/// Position of the end effector, with links of 1 m.
-fn tip<const N: usize>(q: &[f64; N]) -> (f64, f64) {
-    let mut direction = 0.0;
-    q.iter().fold((0.0, 0.0), |(x, y), q| {
-        direction += q;
-        (x + direction.cos(), y + direction.sin())
-    })
-}
-
+/// With links of 1 m.
 fn arrived<const N: usize>(q: &[f64; N], setpoint: &[f64; N]) -> bool {
-    let (got, want) = (tip(q), tip(setpoint));
-    q.iter()
-        .zip(setpoint)
-        .all(|(q, setpoint)| (q - setpoint).abs() <= TOLERANCE)
-        && (got.0 - want.0).hypot(got.1 - want.1) <= TOLERANCE
+    let tip = |q: &[f64; N]| forward(&[1.0; N], q).position;
+    let is_near = |(q, setpoint): (&f64, &f64)| (q - setpoint).abs() <= TOLERANCE;
+    q.iter().zip(setpoint).all(is_near) && tip(q).distance(tip(setpoint)) <= TOLERANCE
 }
 
 /// The last time at which the arm is away from a new setpoint \[s after the change\].
 fn settling_time<const N: usize>(simulation: &mut Simulation<N>, setpoint: [f64; N]) -> f64 {
-    simulation.set_setpoint(Setpoint {
-        position: setpoint,
-        velocity: [0.0; N],
-    });
+    simulation.set_setpoint(Setpoint::at(setpoint));
     simulation.enable(true);
     let start = simulation.time();
     let mut away = 0.0;
@@ -73,16 +61,11 @@ fn from_any_setpoint_within_a_turn_any_other_is_reached_in_four_seconds() {
             let mut simulation = Simulation::new(Arm::default(), gains);
             simulation.set_method(method);
             simulation.set_timestep(timestep);
-            simulation.set_state(State {
-                position: std::array::from_fn(|_| TAU * (2.0 * rng.f64() - 1.0)),
-                velocity: [0.0; N],
-            });
-            let from = *simulation.state();
+            let from = std::array::from_fn(|_| TAU * (2.0 * rng.f64() - 1.0));
+            simulation.set_state(State::at_rest(from));
             let time = settling_time(&mut simulation, setpoint);
-            assert!(
-                time <= SETTLING,
-                "n={N} {method}: {time} s, {from:?} to {setpoint:?}"
-            );
+            let told = format!("n={N} {method}: {time} s, {from:?} to {setpoint:?}");
+            assert!(time <= SETTLING, "{told}");
         }
     }
     check::<2>(Gains::default(), Method::Rk4, 0.001);
@@ -99,10 +82,7 @@ fn from_any_setpoint_within_a_turn_any_other_is_reached_in_four_seconds() {
 fn ringing(arm: Arm<3>, free: u64, setpoint: [f64; 3]) -> f64 {
     let mut simulation = Simulation::new(arm, Gains::default());
     simulation.advance(free);
-    simulation.set_setpoint(Setpoint {
-        position: setpoint,
-        velocity: [0.0; 3],
-    });
+    simulation.set_setpoint(Setpoint::at(setpoint));
     simulation.enable(true);
     let least = 0.1 * gravity_load(&arm, &[0.0; 3])[0];
     let (start, mut at_rest, mut worst) = (simulation.time(), false, 0.0_f64);
@@ -138,10 +118,7 @@ fn the_effort_of_three_links_is_near_the_load_once_they_are_slow() {
             over += u32::from(off > 0.02);
             worst = worst.max(off);
         }
-        println!("{over} of 60 over 2 %, worst {worst}");
-        assert!(
-            over <= over_allowed && worst <= worst_allowed,
-            "{over} of 60, {worst}"
-        );
+        let told = format!("{over} of 60 over 2 %, worst {worst}");
+        assert!(over <= over_allowed && worst <= worst_allowed, "{told}");
     }
 }

@@ -11,20 +11,12 @@ const AWAY: DVec2 = dvec2(1.5, 0.5);
 /// A timestep whose multiples, and those of a second, are exact: the test counts rules, not rounding.
 const H: f64 = 0.125;
 
-fn goal(success_hold: f64) -> Goal {
-    Goal::new(
-        TARGET,
-        Criteria {
-            epsilon: 0.1,
-            success_hold,
-        },
-        0.0,
-    )
-}
-
-/// The first step (counted from 1) after which the goal is reached, for an end effector on `path`.
-fn reached_at(goal: &mut Goal, h: f64, steps: u32, path: impl Fn(u32) -> DVec2) -> Option<u32> {
-    (1..=steps).find(|&k| goal.judge(f64::from(k) * h, path(k)))
+fn goal(epsilon: f64, success_hold: f64, start: f64) -> Goal {
+    let criteria = Criteria {
+        epsilon,
+        success_hold,
+    };
+    Goal::new(TARGET, criteria, start)
 }
 
 /// The step (counted from 1) after which a goal is reached, by `success_hold`, timestep and the steps at which the end
@@ -40,7 +32,7 @@ fn a_goal_is_reached_after_staying_within_epsilon_for_success_hold() {
             "left nine times",
             0.5,
             H,
-            |k| k % 5 != 0 || k >= 50,
+            |k| k % 5 != 0 || k > 49,
             Some(50),
         ),
         ("no hold: the first entry", 0.0, H, |k| k >= 5, Some(5)),
@@ -50,68 +42,39 @@ fn a_goal_is_reached_after_staying_within_epsilon_for_success_hold() {
         ("steps longer than the hold", 0.5, 2.0, |k| k >= 2, Some(3)),
     ];
     for (name, hold, h, is_there, expected) in rows {
+        let mut goal = goal(0.1, hold, 0.0);
         let path = |k| if is_there(k) { THERE } else { AWAY };
-        assert_eq!(
-            reached_at(&mut goal(hold), h, 100, path),
-            expected,
-            "{name}"
-        );
+        let reached = (1..=100).find(|&k| goal.judge(f64::from(k) * h, path(k)));
+        assert_eq!(reached, expected, "{name}");
     }
 }
 
 #[test]
-fn the_edge_of_epsilon_is_within() {
-    let mut at_edge = Goal::new(
-        TARGET,
-        Criteria {
-            epsilon: 0.5,
-            success_hold: 0.0,
-        },
-        0.0,
-    );
+fn the_edge_of_epsilon_is_within_and_a_hand_that_is_nowhere_is_not() {
+    let mut at_edge = goal(0.5, 0.0, 0.0);
     assert_eq!(at_edge.distance(AWAY), 0.5);
     assert!(at_edge.judge(H, AWAY));
-    assert!(!at_edge.judge(H, dvec2(1.5f64.next_up(), 0.5)));
+    let nowhere = [DVec2::NAN, DVec2::INFINITY, dvec2(f64::MAX, -f64::MAX)];
+    for beyond in nowhere.into_iter().chain([dvec2(1.5f64.next_up(), 0.5)]) {
+        assert!(!at_edge.judge(H, beyond), "{beyond}");
+    }
+    assert!(at_edge.distance(dvec2(1e300, 1e300)).is_finite());
 }
 
+/// While paused the arm takes no step, and the goal is not judged. A second query at the same time has the same answer.
 #[test]
-fn a_pause_neither_helps_nor_harms_the_dwell() {
-    // While paused the arm takes no step, and the goal is not judged. A second query at the same time has the same
-    // answer.
-    let mut paused = goal(0.5);
-    for k in 1..=4u32 {
-        assert!(!paused.judge(f64::from(k) * H, THERE));
-    }
-    for _ in 0..1000 {
-        assert!(!paused.judge(4.0 * H, THERE));
-    }
-    assert!(paused.judge(5.0 * H, THERE));
-}
-
-#[test]
-fn a_clock_set_back_starts_the_dwell_over() {
-    let mut goal = Goal::new(
-        TARGET,
-        Criteria {
-            epsilon: 0.1,
-            success_hold: 0.5,
-        },
-        100.0,
-    );
-    for k in 1..=4u32 {
+fn a_pause_neither_helps_nor_harms_the_dwell_and_a_clock_set_back_starts_it_over() {
+    let mut goal = goal(0.1, 0.5, 100.0);
+    for k in [1, 2, 3, 4].into_iter().chain([4; 1000]) {
         assert!(!goal.judge(100.0 + f64::from(k) * H, THERE));
     }
-    assert_eq!(reached_at(&mut goal, H, 100, |_| THERE), Some(5));
-    assert_eq!(goal.elapsed(0.5), 0.0);
-}
-
-#[test]
-fn a_hand_that_is_nowhere_is_not_there() {
-    let mut goal = goal(0.0);
-    for nowhere in [DVec2::NAN, DVec2::INFINITY, dvec2(f64::MAX, -f64::MAX)] {
-        assert!(!goal.judge(H, nowhere));
+    let mut ahead = goal;
+    assert!(ahead.judge(100.0 + 5.0 * H, THERE));
+    for k in 1..=4 {
+        assert!(!goal.judge(f64::from(k) * H, THERE));
     }
-    assert!(goal.distance(dvec2(1e300, 1e300)).is_finite());
+    assert!(goal.judge(5.0 * H, THERE));
+    assert_eq!(goal.elapsed(0.5), 0.0);
 }
 
 proptest! {
@@ -130,7 +93,7 @@ proptest! {
         ],
         first in 1u32..5000,
     ) {
-        let mut goal = Goal::new(TARGET, Criteria { epsilon: 0.1, success_hold: hold }, base);
+        let mut goal = goal(0.1, hold, base);
         let reached = (1..=first + 2 * per_hold).find(|&k| {
             goal.judge(base + f64::from(k) * h, if k < first { AWAY } else { THERE })
         });
@@ -148,42 +111,30 @@ fn due(cadence: &mut Cadence, base: f64, h: f64, steps: u32) -> Vec<u32> {
 }
 
 #[test]
-fn feedback_comes_sixty_times_per_second_of_progress() {
-    for base in [0.0, 1234.567, 2.5e6] {
-        for (h, steps) in [
-            (0.001, 10_000),
-            (1e-4, 100_000),
-            (1.0 / 240.0, 2400),
-            (1.0 / 60.0, 600),
-        ] {
-            let steps = due(&mut Cadence::default(), base, h, steps);
-            assert_eq!(steps.len(), 600, "h = {h}");
-        }
-    }
-}
-
-#[test]
-fn feedback_comes_once_per_step_where_steps_are_longer() {
-    for h in [1.0 / 60.0, 0.02, 0.1, 7.0] {
-        assert_eq!(
-            due(&mut Cadence::default(), 0.0, h, 100).len(),
-            100,
-            "h = {h}"
-        );
+fn feedback_comes_sixty_times_per_second_of_progress_or_once_per_longer_step() {
+    let hertz = |rate: f64| 1.0 / rate;
+    for (base, h, steps, expected) in [
+        (0.0, 0.001, 10_000, 600),
+        (1234.567, 1e-4, 100_000, 600),
+        (2.5e6, hertz(240.0), 2400, 600),
+        (0.0, hertz(60.0), 600, 600),
+        (2.5e6, 0.001, 10_000, 600),
+        (0.0, 0.02, 100, 100),
+        (0.0, 0.1, 100, 100),
+        (0.0, 7.0, 100, 100),
+    ] {
+        let steps = due(&mut Cadence::default(), base, h, steps);
+        assert_eq!(steps.len(), expected, "h = {h} from {base}");
     }
 }
 
 #[test]
 fn progress_without_a_request_is_not_invented() {
     let mut cadence = Cadence::default();
-    assert!(cadence.due(0.0));
-    assert!(cadence.due(10.0));
-    assert!(!cadence.due(10.001));
-    assert!(
-        !cadence.due(10.001),
-        "while the clock stands nothing is due"
-    );
-    assert!(cadence.due(10.02));
+    let rows = [(0.0, true), (10.0, true), (10.001, false), (10.001, false)];
+    for (time, is_due) in rows.into_iter().chain([(10.02, true)]) {
+        assert_eq!(cadence.due(time), is_due, "{time}");
+    }
 }
 
 #[test]

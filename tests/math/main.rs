@@ -3,19 +3,13 @@
 #![allow(
     clippy::approx_constant,
     clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
     clippy::cast_sign_loss,
-    clippy::expect_used,
     clippy::float_cmp,
     clippy::indexing_slicing,
-    clippy::needless_pass_by_value,
     clippy::panic,
-    clippy::print_stdout,
     clippy::unwrap_used,
     dead_code,
-    unreachable_pub,
-    reason = "a test that panics has failed, and may say what it saw; numbers that are compared, written or cast exactly are exact; \
-              helpers are handed values that were made for them, and binaries that share them need not use every part"
+    reason = "a test that panics has failed; compared and cast numbers are exact; programs share their helpers"
 )]
 
 #[cfg(feature = "batch")]
@@ -32,6 +26,8 @@ mod kinematics;
 mod pacer;
 mod particle;
 mod simulation;
+#[path = "../support/stored.rs"]
+mod stored;
 mod trajectory;
 mod trial;
 mod trig;

@@ -50,11 +50,8 @@ fn a_path_passes_through_its_points_and_rests_before_and_after_them() {
     let end = path.at(9.0);
     assert_eq!((end.position, end.velocity), ([3.0, 3.0], [0.0, 0.0]));
     // A path that begins with its first point needs no start.
-    let path = JointPath::new(
-        START,
-        vec![straight(0.0, [1.0, 1.0]), straight(1.0, [2.0, 1.0])],
-    )
-    .unwrap();
+    let points = vec![straight(0.0, [1.0, 1.0]), straight(1.0, [2.0, 1.0])];
+    let path = JointPath::new(START, points).unwrap();
     assert_eq!(path.at(0.0).position, [1.0, 1.0]);
     assert_eq!(path.at(-1.0).velocity, [0.0, 0.0]);
 }
@@ -72,23 +69,16 @@ fn velocities_are_the_derivatives_of_the_positions() {
         let (before, after) = (path.at(time - h).position, path.at(time + h).position);
         let slope = [0, 1].map(|joint| (after[joint] - before[joint]) / (2.0 * h));
         // Central differences of a cubic: h² times its third derivative, some 100, and rounding, 1e-16 / h.
-        let end = if time < 2.0 {
-            path.at(time).velocity
-        } else {
-            [0.0; 2]
-        };
-        assert!(near(slope, end, 2e-9), "{time}: {slope:?} {end:?}");
+        let setpoint = path.at(time).velocity;
+        assert!(near(slope, setpoint, 2e-9), "{time}: {slope:?}");
     }
 }
 
 #[test]
 fn points_without_increasing_times_are_no_path() {
     let path = |times: &[f64]| {
-        let points = times
-            .iter()
-            .map(|time| straight(*time, [0.0, 0.0]))
-            .collect();
-        JointPath::new(START, points).map(|path| path.duration())
+        let points = times.iter().map(|time| straight(*time, [0.0, 0.0]));
+        JointPath::new(START, points.collect()).map(|path| path.duration())
     };
     assert_eq!(path(&[]), Err(PathError::NoPoints));
     assert_eq!(path(&[-1.0]), Err(PathError::Order(0)));
@@ -100,26 +90,18 @@ fn points_without_increasing_times_are_no_path() {
 /// Finite points between which velocities are infinite or positions are not numbers.
 #[test]
 fn distances_that_overflow_are_no_path() {
-    let moving = |time: f64, position: f64, velocity: f64| Waypoint {
-        time,
-        position: [position, 0.0],
-        velocity: Some([velocity, 0.0]),
-    };
+    let resting = |time: f64, position: f64| straight(time, [position, 0.0]);
+    let moving =
+        |time: f64, position: f64, velocity: f64| curved(time, [position, 0.0], [velocity, 0.0]);
     for (at, points) in [
-        (0, vec![straight(1.0, [1.7e308, 0.0])]),
-        (
-            1,
-            vec![straight(1.0, [0.0; 2]), straight(2.0, [-1.7e308, 0.0])],
-        ),
-        (0, vec![straight(5e-324, [1.0, 0.0])]),
+        (0, vec![resting(1.0, 1.7e308)]),
+        (1, vec![resting(1.0, 0.0), resting(2.0, -1.7e308)]),
+        (0, vec![resting(5e-324, 1.0)]),
         (1, vec![moving(0.0, 0.0, 0.0), moving(1e308, 1.0, 1e10)]),
         (0, vec![moving(f64::INFINITY, 1.0, 0.0)]),
     ] {
-        assert_eq!(
-            JointPath::new(START, points.clone()),
-            Err(PathError::NotFinite(at)),
-            "{points:?}"
-        );
+        let refused = JointPath::new(START, points);
+        assert_eq!(refused, Err(PathError::NotFinite(at)));
     }
     let far = JointPath::new(START, vec![moving(1e290, 1e300, 1e9)]).unwrap();
     for part in 0..=1000 {
@@ -151,23 +133,17 @@ fn a_path_is_judged_by_its_path_tolerances_and_at_the_end_by_its_goal_tolerances
         panic!("joint 1 is off");
     };
     assert_eq!((excess.joint, excess.error, excess.limit), (0, 0.25, 0.1));
-    assert_eq!(
-        excess.to_string(),
-        "position of joint1 is off by 0.25, more than 0.1"
-    );
+    let text = "position of joint1 is off by 0.25, more than 0.1";
+    assert_eq!(excess.to_string(), text);
     let Standing::OffPath(excess) = course.judge(0.5, &at([0.5, 0.0], [0.0, -2.0])) else {
         panic!("joint 2 is too fast");
     };
     assert_eq!((excess.quantity, excess.joint), ("velocity", 1));
     assert_eq!(course.judge(1.5, &at([0.5, 0.6], rest)), Standing::Moving);
-    assert!(matches!(
-        course.judge(1.6, &at([0.5, 0.6], rest)),
-        Standing::Late(_)
-    ));
-    assert!(matches!(
-        course.judge(0.5, &at([f64::NAN, 0.0], rest)),
-        Standing::OffPath(_)
-    ));
+    let standing = course.judge(1.6, &at([0.5, 0.6], rest));
+    assert!(matches!(standing, Standing::Late(_)));
+    let standing = course.judge(0.5, &at([f64::NAN, 0.0], rest));
+    assert!(matches!(standing, Standing::OffPath(_)));
 
     // A joint has arrived if it stays. A joint that passes through is late.
     let there = [0.5, 0.505];

@@ -45,38 +45,23 @@ fn one(angle: f64) -> (f64, f64) {
     (sin, cos)
 }
 
-/// An error below 1 ulp is at most one number away from the exact value rounded.
+/// An error below 1 ulp is at most one number away from the exact value rounded, and from another such value.
+fn check(angle: f64, want: (f64, f64)) {
+    let got = one(angle);
+    let is_near = apart(got.0, want.0) <= 1 && apart(got.1, want.1) <= 1;
+    assert!(is_near, "of {angle}: {got:?} for {want:?}");
+}
+
 #[test]
 fn hard_angles_are_within_one_number_of_the_exact_value() {
     for (angle, sin, cos) in KNOWN {
-        let got = one(angle);
-        assert!(
-            apart(got.0, sin) <= 1,
-            "sine of {angle}: {} for {sin}",
-            got.0
-        );
-        assert!(
-            apart(got.1, cos) <= 1,
-            "cosine of {angle}: {} for {cos}",
-            got.1
-        );
+        check(angle, (sin, cos));
     }
 }
 
-/// Both are below 1 ulp from the exact value, so at most one number lies between them.
 #[test]
 fn every_angle_is_within_one_number_of_the_c_library() {
-    let check = |angle: f64| {
-        let ((sin, cos), (want_sin, want_cos)) = (one(angle), angle.sin_cos());
-        assert!(
-            apart(sin, want_sin) <= 1,
-            "sine of {angle}: {sin} for {want_sin}"
-        );
-        assert!(
-            apart(cos, want_cos) <= 1,
-            "cosine of {angle}: {cos} for {want_cos}"
-        );
-    };
+    let check = |angle: f64| check(angle, angle.sin_cos());
     // Steps that are no simple part of a turn: densely around a few turns, then up to the limit and beyond.
     for k in -1_000_000..=1_000_000 {
         check(f64::from(k) * 1.234_567e-5);

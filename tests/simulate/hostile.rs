@@ -10,6 +10,7 @@ use crate::court::Court;
 use crate::honest::Honest;
 use crate::pipe::Fate;
 use crate::plan::Hostility;
+use crate::workload::frame;
 use pendularm_client::websocket::{append, opcode};
 
 /// A decimal that is slow to read exactly: 20 digits near the middle between two doubles.
@@ -39,6 +40,16 @@ impl Hostile {
         self.client.send(frame, 0);
     }
 
+    /// Calls a service, with further members or none.
+    fn call(&self, service: &str, more: &str) {
+        self.say(&frame("call_service", "service", service, more));
+    }
+
+    /// Sends an operation about a topic, with further members or none.
+    fn about(&self, op: &str, topic: &str, more: &str) {
+        self.say(&frame(op, "topic", topic, more));
+    }
+
     fn raw(&self, bytes: impl Into<Vec<u8>>) {
         self.client.send_bytes(bytes.into());
     }
@@ -52,32 +63,31 @@ impl Hostile {
         match deed {
             Hostility::SlowNumbers => {
                 let numbers = slow_numbers(court.below(court.among(&LONG)));
-                let frame = court.among(&[
-                    format!("{{\"op\":\"publish\",\"topic\":\"/t0\",\"msg\":{{\"a\":{numbers}}}}}"),
-                    format!("{{\"op\":\"call_service\",\"service\":\"/arm_sim/set_gains\",\"args\":{{\"kp\":{numbers}}}}}"),
-                    format!("{{\"op\":\"publish\",\"topic\":\"/joint_trajectory\",\"msg\":{{\"points\":[{{\"positions\":{numbers}}}]}}}}"),
-                ]);
-                self.say("{\"op\":\"advertise\",\"topic\":\"/t0\"}");
-                self.say(&frame);
+                let points = format!("\"msg\":{{\"points\":[{{\"positions\":{numbers}}}]}}");
+                let msg = format!("\"msg\":{{\"a\":{numbers}}}");
+                let gains = format!("\"args\":{{\"kp\":{numbers}}}");
+                self.about("advertise", "/t0", "");
+                match court.below(3) {
+                    0 => self.about("publish", "/t0", &msg),
+                    1 => self.call("/arm_sim/set_gains", &gains),
+                    _ => self.about("publish", "/joint_trajectory", &points),
+                }
             }
             Hostility::LongIds => {
                 let id = slow_numbers(court.below(court.among(&LONG)));
                 let service =
                     court.among(&["/pid_controller/enable", "/nobody", "/rosapi/topics", "/s0"]);
-                self.say(&format!(
-                    "{{\"op\":\"call_service\",\"service\":\"{service}\",\"id\":{id}}}"
-                ));
+                self.call(service, &format!("\"id\":{id}"));
             }
             Hostility::GoalWithLongId => {
                 let id = slow_numbers(court.below(court.among(&LONG)));
-                self.say(&format!(
-                    "{{\"op\":\"send_action_goal\",\"action\":\"/ik_action\",\"args\":{{\"x\":1,\"y\":0.5}},\"feedback\":true,\"id\":{id}}}"
-                ));
+                let more = format!("\"args\":{{\"x\":1,\"y\":0.5}},\"feedback\":true,\"id\":{id}");
+                self.say(&frame("send_action_goal", "action", "/ik_action", &more));
             }
             Hostility::PingFlood => self.flood_pings(court),
             Hostility::Deaf => {
                 for topic in ["/t0", "/t1", "/joint_states", "/tf", "/deep/t2"] {
-                    self.say(&format!("{{\"op\":\"subscribe\",\"topic\":\"{topic}\"}}"));
+                    self.about("subscribe", topic, "");
                 }
                 self.client.pause(true);
             }
@@ -87,34 +97,31 @@ impl Hostile {
                     let (n, topic) = (self.next(), court.among(&["/t1", "/many_sizes"]));
                     let size = 64 + 5 * court.below(300);
                     let compression = court.among(&["none", "cbor", "cbor-raw", "png"]);
-                    self.say(&format!(
-                        "{{\"op\":\"subscribe\",\"id\":\"{n}\",\"topic\":\"{topic}\",\"fragment_size\":{size},\"compression\":\"{compression}\"}}"
-                    ));
+                    let more = format!(
+                        "\"id\":\"{n}\",\"fragment_size\":{size},\"compression\":\"{compression}\""
+                    );
+                    self.about("subscribe", topic, &more);
                 }
             }
             Hostility::StepByHand => {
-                self.say(
-                    "{\"op\":\"call_service\",\"service\":\"/arm_sim/pause\",\"args\":[true]}",
-                );
+                self.call("/arm_sim/pause", "\"args\":[true]");
                 for _ in 0..court.below(4) {
                     let steps = court.among(&["1", "2000", "10000"]);
-                    self.say(&format!("{{\"op\":\"call_service\",\"service\":\"/arm_sim/step\",\"args\":[{steps}]}}"));
+                    self.call("/arm_sim/step", &format!("\"args\":[{steps}]"));
                 }
             }
             Hostility::Registrations => {
                 for _ in 0..court.below(200) {
-                    let n = self.next();
+                    let name = format!("/hoard/{}", self.next());
                     let op = court.among(&["advertise", "subscribe"]);
-                    self.say(&format!("{{\"op\":\"{op}\",\"topic\":\"/hoard/{n}\"}}"));
-                    self.say(&format!(
-                        "{{\"op\":\"advertise_service\",\"service\":\"/hoard/{n}\"}}"
-                    ));
+                    self.about(op, &name, "");
+                    self.say(&frame("advertise_service", "service", &name, ""));
                 }
             }
             Hostility::DayLongCalls => {
-                self.say("{\"op\":\"advertise_service\",\"service\":\"/never\"}");
+                self.say(&frame("advertise_service", "service", "/never", ""));
                 for _ in 0..court.below(100) {
-                    self.say("{\"op\":\"call_service\",\"service\":\"/never\",\"timeout\":86400}");
+                    self.call("/never", "\"timeout\":86400");
                 }
             }
             Hostility::Unfinished => {
@@ -125,9 +132,8 @@ impl Hostile {
             }
             Hostility::Dribble => {
                 if self.dribble.is_empty() {
-                    self.dribble =
-                        b"{\"op\":\"call_service\",\"service\":\"/arm_sim/pause\",\"args\":{}}\n"
-                            .to_vec();
+                    let call = frame("call_service", "service", "/arm_sim/pause", "\"args\":{}");
+                    self.dribble = (call + "\n").into_bytes();
                 }
                 let byte = self.dribble.remove(0);
                 self.raw([byte]);
@@ -135,25 +141,32 @@ impl Hostile {
             Hostility::Garbage => self.garbage(court),
             Hostility::TinyTimestep => {
                 let step = court.among(&["1e-9", "1e-6", "1e-300", "1e300", "0.5", "1e-3"]);
-                self.say(&format!("{{\"op\":\"call_service\",\"service\":\"/arm_sim/set_integrator\",\"args\":[\"euler\",{step}]}}"));
+                self.call(
+                    "/arm_sim/set_integrator",
+                    &format!("\"args\":[\"euler\",{step}]"),
+                );
                 let params = court.among(&[
                     "[0,[1e-9,1e9]]",
                     "[1e300]",
                     "[9.81,[1,1],[1,1]]",
                     "{\"masses\":[1e-300,1e-300]}",
                 ]);
-                self.say(&format!("{{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{params}}}"));
+                self.call("/arm_sim/set_params", &format!("\"args\":{params}"));
             }
             Hostility::Computations => {
                 for _ in 0..court.below(20) {
-                    let frame = court.among(&[
-                        "{\"op\":\"call_service\",\"service\":\"/study/rollout\",\"args\":{\"duration\":0.2}}",
-                        "{\"op\":\"call_service\",\"service\":\"/arm_sim/integration_step\",\"args\":[\"t\",0,0,1,3000,\"euler\"]}",
-                        "{\"op\":\"call_service\",\"service\":\"/arm_sim/integration_step\",\"args\":[\"sin(t)\",0,0,0.01,20000,\"rk4\"]}",
-                        "{\"op\":\"call_service\",\"service\":\"/study/rollout\",\"args\":{\"duration\":0.3,\"reference\":true,\"samples\":50}}",
-                        "{\"op\":\"call_service\",\"service\":\"/study/stability\",\"args\":[7]}",
+                    let (rollout, step) = ("/study/rollout", "/arm_sim/integration_step");
+                    let (service, args) = court.among(&[
+                        (rollout, "{\"duration\":0.2}"),
+                        (step, "[\"t\",0,0,1,3000,\"euler\"]"),
+                        (step, "[\"sin(t)\",0,0,0.01,20000,\"rk4\"]"),
+                        (
+                            rollout,
+                            "{\"duration\":0.3,\"reference\":true,\"samples\":50}",
+                        ),
+                        ("/study/stability", "[7]"),
                     ]);
-                    self.say(frame);
+                    self.call(service, &format!("\"args\":{args}"));
                 }
             }
             Hostility::Impersonate => self.impersonate(court, honest),
@@ -178,20 +191,17 @@ impl Hostile {
                         "/pid_controller/enable",
                         "/s0",
                     ]);
-                    self.say(&format!(
-                        "{{\"op\":\"call_service\",\"service\":\"{service}\",\"id\":\"h{n}\"}}"
-                    ));
+                    self.call(service, &format!("\"id\":\"h{n}\""));
                 }
             }
             Hostility::Throttles => {
                 for _ in 0..court.below(30) {
-                    let (n, rate) = (
-                        self.next(),
-                        court.among(&["1", "1000", "1e15", "31536000000"]),
+                    let rate = court.among(&["1", "1000", "1e15", "31536000000"]);
+                    let more = format!(
+                        "\"id\":{},\"throttle_rate\":{rate},\"queue_length\":100000",
+                        self.next()
                     );
-                    self.say(&format!(
-                        "{{\"op\":\"subscribe\",\"id\":{n},\"topic\":\"/t0\",\"throttle_rate\":{rate},\"queue_length\":100000}}"
-                    ));
+                    self.about("subscribe", "/t0", &more);
                 }
             }
         }
@@ -238,33 +248,26 @@ impl Hostile {
     }
 
     fn impersonate(&self, court: &Court, honest: &[Honest]) {
-        let ids: Vec<String> = honest
-            .iter()
-            .flat_map(|one| one.calls.keys().cloned())
-            .collect();
-        let id = if ids.is_empty() {
-            "1".to_owned()
-        } else {
-            court.among(&ids)
+        let ids = honest.iter().flat_map(|one| one.calls.keys().cloned());
+        let ids: Vec<String> = ids.collect();
+        let id = match ids.is_empty() {
+            true => "1".to_owned(),
+            false => court.among(&ids),
         };
         let guess = court.below(60);
-        for frame in [
-            format!(
-                "{{\"op\":\"service_response\",\"service\":\"/s0\",\"id\":\"pendularm:{guess}\",\"values\":{{\"stolen\":1}},\"result\":true}}"
-            ),
-            format!(
-                "{{\"op\":\"service_response\",\"service\":\"/s0\",\"id\":{id},\"values\":{{}},\"result\":true}}"
-            ),
-            format!("{{\"op\":\"cancel_action_goal\",\"action\":\"/ik_action\",\"id\":{id}}}"),
-            "{\"op\":\"unadvertise_service\",\"service\":\"/s0\"}".to_owned(),
-            "{\"op\":\"unadvertise\",\"topic\":\"/t0\"}".to_owned(),
-            "{\"op\":\"publish\",\"topic\":\"/joint_states\",\"msg\":{\"position\":[9,9]}}"
-                .to_owned(),
-            "{\"op\":\"publish\",\"topic\":\"/t0\",\"msg\":{\"from\":1,\"number\":1}}".to_owned(),
-            "{\"op\":\"advertise_service\",\"service\":\"/arm_sim/reset\"}".to_owned(),
-        ] {
-            self.say(&frame);
-        }
+        let answer = |id: &str, values: &str| {
+            let more = format!("\"id\":{id},\"values\":{values},\"result\":true");
+            self.say(&frame("service_response", "service", "/s0", &more));
+        };
+        answer(&format!("\"pendularm:{guess}\""), "{\"stolen\":1}");
+        answer(&id, "{}");
+        let goal = format!("\"id\":{id}");
+        self.say(&frame("cancel_action_goal", "action", "/ik_action", &goal));
+        self.say(&frame("unadvertise_service", "service", "/s0", ""));
+        self.about("unadvertise", "/t0", "");
+        self.about("publish", "/joint_states", "\"msg\":{\"position\":[9,9]}");
+        self.about("publish", "/t0", "\"msg\":{\"from\":1,\"number\":1}");
+        self.say(&frame("advertise_service", "service", "/arm_sim/reset", ""));
     }
 }
 

@@ -16,17 +16,14 @@
 
 #![allow(
     clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
     clippy::cast_sign_loss,
     clippy::expect_used,
-    clippy::float_cmp,
     clippy::indexing_slicing,
     clippy::panic,
     clippy::print_stdout,
     clippy::too_many_lines,
     clippy::unwrap_used,
     unreachable_pub,
-    missing_docs,
     reason = "a simulation that panics has failed; it tells people what it does"
 )]
 
@@ -92,10 +89,8 @@ fn main() {
 /// A number from the environment. An empty variable counts as unset.
 fn number<T: std::str::FromStr>(name: &str) -> Option<T> {
     let text = std::env::var(name).ok().filter(|text| !text.is_empty())?;
-    Some(
-        text.parse()
-            .unwrap_or_else(|_| panic!("{name} must be a number, got {text}")),
-    )
+    let number = text.parse();
+    Some(number.unwrap_or_else(|_| panic!("{name} must be a number, got {text}")))
 }
 
 /// Every panic is recorded, also one that is caught.
@@ -104,18 +99,15 @@ fn hear_panics() {
     let inner = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         let payload = info.payload();
-        let words = payload.downcast_ref::<String>().map(String::as_str);
-        let words = words
-            .or_else(|| payload.downcast_ref::<&str>().copied())
-            .unwrap_or_default();
+        let text = payload.downcast_ref::<String>().map(String::as_str);
+        let text = text.or(payload.downcast_ref::<&str>().copied());
+        let words = text.unwrap_or_default();
         // A panic in a pipe poisons the lock that its halves share.
         let is_meant = words == pipe::MEANT || words.contains("PoisonError");
         if !is_meant {
             let place = info.location().map(ToString::to_string).unwrap_or_default();
-            PANIC
-                .lock()
-                .unwrap()
-                .get_or_insert(format!("{place}: {words}"));
+            let mut first = PANIC.lock().unwrap();
+            first.get_or_insert(format!("{place}: {words}"));
         }
         inner(info);
     }));
@@ -133,17 +125,13 @@ fn watch(began: Instant) {
             if seen.replace(since) != Some(since) {
                 worked = works;
             }
-            let work = works
-                .zip(worked)
-                .map(|(now, then)| now.saturating_sub(then));
+            let pair = works.zip(worked);
+            let is_long = pair.is_none_or(|(now, then)| now.saturating_sub(then) > PATIENCE);
             let waits = began.elapsed().saturating_sub(Duration::from_millis(since));
-            if work.is_none_or(|work| work > PATIENCE) && waits > PATIENCE || waits > LONG_PATIENCE
-            {
+            if (is_long && waits > PATIENCE) || waits > LONG_PATIENCE {
                 let words = format!("the seed has taken {waits:?}: some turn does not end");
-                let failure = Failure {
-                    verdict: Verdict::NoProgress,
-                    words,
-                };
+                let verdict = Verdict::NoProgress;
+                let failure = Failure { verdict, words };
                 tell(SEED.load(Ordering::Relaxed), &failure);
                 std::process::exit(failure.verdict as i32);
             }
@@ -171,20 +159,12 @@ fn attempt(seed: u64, keeps_log: bool, began: Instant) -> Outcome {
     *PANIC.lock().unwrap() = None;
     let played = catch_unwind(AssertUnwindSafe(|| play(seed, keeps_log)));
     let panic = PANIC.lock().unwrap().take();
-    let mut outcome = played.unwrap_or_else(|_| Outcome {
-        plan: String::new(),
-        failure: None,
-        hash: 0,
-        log: Vec::new(),
-        tally: BTreeMap::new(),
-    });
+    let mut outcome = played.unwrap_or_default();
     if let Some(words) = panic {
         // Assertions of a second reader concern the received bytes, not the reader.
-        let is_ours = words.starts_with("src/");
-        let verdict = if is_ours {
-            Verdict::Crash
-        } else {
-            Verdict::Wrong
+        let verdict = match words.starts_with("src/") {
+            true => Verdict::Crash,
+            false => Verdict::Wrong,
         };
         outcome.failure = Some(Failure { verdict, words });
     }
@@ -217,20 +197,16 @@ fn differ(first: &Outcome, second: &Outcome) -> Option<Failure> {
     let words = place.map_or("in their lengths".to_owned(), |(at, (one, other))| {
         format!("at event {at}: {one:?} and {other:?}")
     });
-    Some(Failure {
-        verdict: Verdict::Wrong,
-        words: format!("two runs of one seed differ {words}"),
-    })
+    let words = format!("two runs of one seed differ {words}");
+    let verdict = Verdict::Wrong;
+    Some(Failure { verdict, words })
 }
 
 fn play_many(began: Instant) -> i32 {
     let minutes: Option<f64> = number("MINUTES");
     let from: u64 = number("FROM").unwrap_or(1);
-    let count: u64 = number("SEEDS").unwrap_or(if minutes.is_some() {
-        u64::MAX
-    } else {
-        DEFAULT_SEEDS
-    });
+    let count = minutes.map_or(DEFAULT_SEEDS, |_| u64::MAX);
+    let count = number("SEEDS").unwrap_or(count);
     let end = minutes.map(|minutes| Duration::from_secs_f64(minutes * 60.0));
     let goes_on = std::env::var("GO_ON").is_ok_and(|text| !text.is_empty());
     let how_many = match minutes {
@@ -254,10 +230,9 @@ fn play_many(began: Instant) -> i32 {
         }
         for (what, count) in &outcome.tally {
             let all = tally.entry(what).or_default();
-            *all = if what.starts_with(court::MOST) {
-                *count.max(all)
-            } else {
-                *all + count
+            *all = match what.starts_with(court::MOST) {
+                true => *count.max(all),
+                false => *all + count,
             };
         }
         let again = twice.then(|| attempt(seed, true, began));

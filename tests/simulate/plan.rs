@@ -96,16 +96,8 @@ impl Plan {
             features,
             faults: swarm(court, Fault::ALL, 0.5),
             hostilities: swarm(court, Hostility::ALL, 0.4),
-            fault: if has_faults {
-                0.02 + 0.1 * court.fraction()
-            } else {
-                0.0
-            },
-            hostility: if has_enemies {
-                0.05 + 0.5 * court.fraction()
-            } else {
-                0.0
-            },
+            fault: share(court, has_faults, 0.02, 0.1),
+            hostility: share(court, has_enemies, 0.05, 0.5),
             bursts: swarm(court, Burst::ALL, 0.6),
             burst: 0.02 + 0.06 * court.fraction(),
             together: court.chance(0.5),
@@ -113,16 +105,21 @@ impl Plan {
     }
 }
 
+/// A probability between `least` and `least + span`, or none.
+fn share(court: &Court, is_any: bool, least: f64, span: f64) -> f64 {
+    if is_any {
+        least + span * court.fraction()
+    } else {
+        0.0
+    }
+}
+
 /// A random subset, each entry with a weight.
 fn swarm<T: Copy + fmt::Debug>(court: &Court, all: &[T], share: f64) -> Vec<(T, f64)> {
-    let chosen: Vec<T> = all
-        .iter()
-        .copied()
-        .filter(|_| court.chance(share))
-        .collect();
-    let weighed = chosen
-        .into_iter()
-        .map(|one| (one, 0.2 + court.fraction() * 3.0));
+    let mut chosen = all.to_vec();
+    chosen.retain(|_| court.chance(share));
+    let chosen = chosen.into_iter();
+    let weighed = chosen.map(|one| (one, 0.2 + court.fraction() * 3.0));
     // Removed after the draw, so that the rest of the plan does not change.
     let without = std::env::var("WITHOUT").unwrap_or_default();
     let is_left_out = |one: &T| {

@@ -11,10 +11,15 @@ use pendularm::study::paused::at_once;
 use pendularm::study::rollout::{RolloutRequest, rollout};
 use pendularm::study::stability::{limit_held, limits};
 
+use crate::stored::gains;
+
 fn control(period: f64, delay: bool) -> ControlLoop<2> {
-    let setpoint = Setpoint::at([0.4, 0.8]);
-    ControlLoop::new(Arm::default(), Gains::default(), setpoint)
-        .with_period(ControlPeriod { period, delay })
+    controlled(Gains::default(), [0.4, 0.8], period, delay)
+}
+
+fn controlled(gains: Gains<2>, setpoint: [f64; 2], period: f64, delay: bool) -> ControlLoop<2> {
+    let control = ControlLoop::new(Arm::default(), gains, Setpoint::at(setpoint));
+    control.with_period(ControlPeriod { period, delay })
 }
 
 /// Whether a small deviation dies out in a thousand periods, stepped as the live arm steps.
@@ -29,11 +34,8 @@ fn dies_out(control: &ControlLoop<2>) -> bool {
     simulation.advance(20_000);
     simulation.set_timestep(control.timestep);
     simulation.set_control_period(control.period);
-    let nudged = State {
-        position: simulation.state().position.map(|q| q + 1e-6),
-        velocity: [0.0; 2],
-    };
-    simulation.set_state(nudged);
+    let nudged = simulation.state().position.map(|q| q + 1e-6);
+    simulation.set_state(State::at_rest(nudged));
     let steps = control.period.steps(control.timestep);
     simulation.advance(1000 * steps);
     let off = |i: usize| (simulation.state().position[i] - [0.4, 0.8][i]).abs();
@@ -47,11 +49,8 @@ fn the_limit_of_the_control_period_is_where_a_finely_stepped_loop_ceases_to_be_s
         for (part, stable) in [(0.97, true), (1.03, false)] {
             let period = part * limit;
             let loop_of = control(period, delay).with_timestep(period / 40.0);
-            assert_eq!(
-                dies_out(&loop_of),
-                stable,
-                "{part} of {limit}, delay {delay}"
-            );
+            let told = format!("{part} of {limit}, delay {delay}");
+            assert_eq!(dies_out(&loop_of), stable, "{told}");
         }
     }
     // As the kept report has them, without a delay and with one.
@@ -71,10 +70,8 @@ fn the_limit_of_the_timestep_is_the_longest_whole_part_of_the_period_that_is_sta
                 continue;
             }
             let steps = (period / limit).round();
-            assert!(
-                dies_out(&sampled.with_timestep(period / steps)),
-                "{method} {period}"
-            );
+            let longest = sampled.with_timestep(period / steps);
+            assert!(dies_out(&longest), "{method} {period}");
             if steps > 1.0 {
                 let longer = sampled.with_timestep(period / (steps - 1.0));
                 assert!(!dies_out(&longer), "{method} {period}: {steps} steps");
@@ -88,15 +85,10 @@ fn the_limit_of_the_timestep_is_the_longest_whole_part_of_the_period_that_is_sta
     assert_eq!(clock_limits(&every_step).timestep, limit_held(&every_step));
 }
 
-/// The student's experiment: the period stays, the timestep falls.
 /// The default arm, whose setpoint has a shorter limit with a late effort than without.
 #[test]
 fn the_limits_over_all_poses_and_the_advice_include_a_late_effort() {
-    let at = |delay| {
-        let setpoint = Setpoint::at([0.8, -0.6]);
-        ControlLoop::new(Arm::<2>::default(), Gains::default(), setpoint)
-            .with_period(ControlPeriod { period: 0.0, delay })
-    };
+    let at = |delay| controlled(Gains::default(), [0.8, -0.6], 0.0, delay);
     let (prompt, late) = (limits(&at(false)), limits(&at(true)));
     assert!(late.held < prompt.held && late.minimum_held < prompt.minimum_held);
     assert!(late.minimum_held <= late.held && late.bound.is_none());
@@ -107,20 +99,10 @@ fn the_limits_over_all_poses_and_the_advice_include_a_late_effort() {
 /// A loop whose integral makes it grow has no stable period, with a late effort as without.
 #[test]
 fn a_loop_that_its_integral_drives_has_no_stable_timestep() {
-    let gains = Gains {
-        kp: [60.0, 30.0],
-        ki: [2000.0, 0.0],
-        kd: [25.0, 8.0],
-    };
+    let gains = gains([60.0, 30.0], [2000.0, 0.0], [25.0, 8.0]);
     for delay in [false, true] {
-        let control = ControlLoop::new(Arm::<2>::default(), gains, Setpoint::default())
-            .with_period(ControlPeriod { period: 0.0, delay });
-        let found = clock_limits(&control);
-        assert_eq!(
-            (found.period, found.timestep),
-            (Some(0.0), Some(0.0)),
-            "{delay}"
-        );
+        let found = clock_limits(&controlled(gains, [0.0; 2], 0.0, delay));
+        assert_eq!([found.period, found.timestep], [Some(0.0); 2], "{delay}");
     }
 }
 
@@ -128,11 +110,7 @@ fn a_loop_that_its_integral_drives_has_no_stable_timestep() {
 #[test]
 fn there_is_advice_for_a_control_period_up_to_it_alone() {
     let advised = |period: f64| {
-        let control = ControlLoop::new(Arm::<2>::default(), Gains::default(), Setpoint::default())
-            .with_period(ControlPeriod {
-                period,
-                delay: false,
-            });
+        let control = controlled(Gains::default(), [0.0; 2], period, false);
         limits(&control).advised_for(&Motion::ahead(&control, &State::rest()))
     };
     let every_step = advised(0.0).unwrap();
@@ -143,21 +121,11 @@ fn there_is_advice_for_a_control_period_up_to_it_alone() {
 #[test]
 fn at_one_control_period_a_shorter_timestep_lowers_the_methods_error_by_its_order_and_the_others_not()
  {
-    let gains = Gains {
-        kp: [200.0, 100.0],
-        ki: [0.0; 2],
-        kd: [30.0, 12.0],
-    };
+    let gains = gains([200.0, 100.0], [0.0; 2], [30.0, 12.0]);
     let errors = |method: Method, timestep: f64| {
-        let control = ControlLoop::new(Arm::default(), gains, Setpoint::at([0.8, -0.6]))
-            .with_method(method)
-            .with_timestep(timestep)
-            .with_period(ControlPeriod {
-                period: 0.01,
-                delay: false,
-            });
+        let control = controlled(gains, [0.8, -0.6], 0.01, false).with_method(method);
         let request = RolloutRequest {
-            control,
+            control: control.with_timestep(timestep),
             start: State::rest(),
             duration: 2.0,
             samples: 101,
@@ -167,25 +135,14 @@ fn at_one_control_period_a_shorter_timestep_lowers_the_methods_error_by_its_orde
         let method = made.deviation.unwrap().error;
         (method, made.from_ideal.unwrap().known().unwrap())
     };
-    for (method, order) in [
-        (Method::Euler, 1),
-        (Method::Midpoint, 2),
-        (Method::Verlet, 2),
-        (Method::Rk4, 4),
-    ] {
+    for method in Method::ALL {
         let (long, of_long) = errors(method, 5e-4);
         let (short, of_short) = errors(method, 2.5e-4);
-        let ratio = (long / short).log2();
-        assert!(
-            (ratio - f64::from(order)).abs() < 0.3,
-            "{method}: {long} and {short}"
-        );
+        let off = (long / short).log2() - f64::from(method.order());
+        assert!(off.abs() < 0.3, "{method}: {long} and {short}");
         assert!(of_short > 1e-2, "{of_short}");
-        if method != Method::Euler {
-            assert!(
-                (of_long / of_short - 1.0).abs() < 0.01,
-                "{method}: {of_long} and {of_short}"
-            );
-        }
+        let is_same = (of_long / of_short - 1.0).abs() < 0.01;
+        let told = format!("{method}: {of_long} and {of_short}");
+        assert!(is_same || method == Method::Euler, "{told}");
     }
 }

@@ -9,12 +9,7 @@ use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::{Equilibrium, equilibrium};
 use pendularm::study::stability::{Rest, limit_held, limits};
 
-fn at<const N: usize>(position: [f64; N]) -> Setpoint<N> {
-    Setpoint {
-        position,
-        velocity: [0.0; N],
-    }
-}
+use crate::stored::gains;
 
 /// The largest effort that nothing balances at rest, of the joints that hold no load by their integral \[N m\].
 pub(crate) fn residual<const N: usize>(control: &ControlLoop<N>, rest: &Equilibrium<N>) -> f64 {
@@ -38,13 +33,9 @@ fn soft<const N: usize>(rng: &mut fastrand::Rng) -> (Gains<N>, Setpoint<N>) {
         part /= 3.0;
         kp
     });
-    let gains = Gains {
-        kp,
-        ki: [0.0; N],
-        kd: kp.map(|kp| 0.3 * kp + 0.5),
-    };
+    let gains = gains(kp, [0.0; N], kp.map(|kp| 0.3 * kp + 0.5));
     let position = std::array::from_fn(|_| PI * (2.0 * rng.f64() - 1.0));
-    (gains, at(position))
+    (gains, Setpoint::at(position))
 }
 
 /// Newton steps alone would converge to a saddle here, and every timestep would count as unstable. The arm rests, and
@@ -53,24 +44,16 @@ fn soft<const N: usize>(rng: &mut fastrand::Rng) -> (Gains<N>, Setpoint<N>) {
 #[test]
 fn a_joint_without_a_restoring_torque_is_not_unstable() {
     let arm = Arm::<2>::new([0.6, 2.6], [0.3, 0.7], 0.0).unwrap();
-    let gains = Gains {
-        kp: [0.0, 26_952.0],
-        ki: [0.0; 2],
-        kd: [280.0, 136.0],
-    };
-    let found = limits(&ControlLoop::new(arm, gains, at([-3.6, -1.9])));
+    let gains = gains([0.0, 26_952.0], [0.0; 2], [280.0, 136.0]);
+    let found = limits(&ControlLoop::new(arm, gains, Setpoint::at([-3.6, -1.9])));
     assert_eq!(found.rest, Rest::Setpoint, "{found:?}");
     assert!(found.held.unwrap() > 1e-3 && found.continuous.unwrap() > 1e-3);
 }
 
 #[test]
 fn an_arm_that_sags_far_is_not_called_unstable() {
-    let gains = Gains {
-        kp: [8.0, 2.6667],
-        ki: [0.0; 2],
-        kd: [2.6667, 1.0],
-    };
-    let setpoint = at([1.694_544_183_420_622_3, -2.503_024_457_368_377_8]);
+    let gains = gains([8.0, 2.6667], [0.0; 2], [2.6667, 1.0]);
+    let setpoint = Setpoint::at([1.694_544_183_420_622_3, -2.503_024_457_368_377_8]);
     let limit = limit_held(&ControlLoop::new(Arm::default(), gains, setpoint)).unwrap();
     assert!((limit - 0.456).abs() < 5e-4, "{limit}");
 }
@@ -78,15 +61,10 @@ fn an_arm_that_sags_far_is_not_called_unstable() {
 /// Upright is an exact balance; a hair beside it the arm falls, and its limit is 0.243 s.
 #[test]
 fn an_exact_balance_is_named_and_answered_like_its_neighbours() {
-    let gains = Gains {
-        kp: [20.0, 5.0],
-        ki: [0.0; 2],
-        kd: [4.0, 1.0],
-    };
-    let arm = Arm::<2>::default();
+    let gains = gains([20.0, 5.0], [0.0; 2], [4.0, 1.0]);
     for (off, balanced) in [(0.0, true), (1e-6, false), (-1e-6, false)] {
-        let setpoint = at([FRAC_PI_2 + off, 0.0]);
-        let control = ControlLoop::new(arm, gains, setpoint);
+        let setpoint = Setpoint::at([FRAC_PI_2 + off, 0.0]);
+        let control = ControlLoop::new(Arm::default(), gains, setpoint);
         let rest = equilibrium(&control);
         assert_eq!(rest.balanced, balanced, "{off}");
         let residual = residual(&control, &rest);
@@ -105,14 +83,8 @@ fn is_a_minimum<const N: usize>(
     rng: &mut fastrand::Rng,
 ) -> bool {
     let potential = |q: &[f64; N]| {
-        let spring: f64 = (0..N)
-            .map(|i| 0.5 * gains.kp[i] * (q[i] - setpoint.position[i]).powi(2))
-            .sum();
-        let state = State {
-            position: *q,
-            velocity: [0.0; N],
-        };
-        spring + energy(arm, &state)
+        let spring = |i: usize| 0.5 * gains.kp[i] * (q[i] - setpoint.position[i]).powi(2);
+        (0..N).map(spring).sum::<f64>() + energy(arm, &State::at_rest(*q))
     };
     let least = potential(rest);
     (0..50).all(|_| {
@@ -132,10 +104,8 @@ fn check_soft<const N: usize>(seed: u64, cases: usize) {
         let rest = equilibrium(&control);
         let residual = residual(&control, &rest);
         assert!(residual < 1e-11, "{told}: {residual:e} N m");
-        assert!(
-            is_a_minimum(&arm, &gains, &setpoint, &rest.position, &mut rng),
-            "{told}: a saddle"
-        );
+        let is_stable = is_a_minimum(&arm, &gains, &setpoint, &rest.position, &mut rng);
+        assert!(is_stable, "{told}: a saddle");
         let limit = limit_held(&control);
         assert!(limit.is_none_or(|limit| limit > 1e-3), "{told}: {limit:?}");
     }

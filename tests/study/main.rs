@@ -2,19 +2,15 @@
 
 #![allow(
     clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
     clippy::cast_sign_loss,
-    clippy::expect_used,
     clippy::float_cmp,
     clippy::indexing_slicing,
-    clippy::needless_pass_by_value,
     clippy::panic,
     clippy::print_stdout,
     clippy::unwrap_used,
     dead_code,
     unreachable_pub,
-    reason = "a test that panics has failed, and may say what it saw; numbers that are compared, written or cast exactly are exact; \
-              helpers are handed values that were made for them, and binaries that share them need not use every part"
+    reason = "a test that panics has failed; compared and cast numbers are exact; programs share their helpers"
 )]
 
 mod clocks;
@@ -26,8 +22,6 @@ mod fewest;
 #[cfg(feature = "report")]
 #[path = "../support/folder.rs"]
 mod folder;
-#[path = "../support/json.rs"]
-mod json;
 mod matrix;
 mod motion;
 mod planner;
@@ -39,4 +33,6 @@ mod report;
 mod rollout;
 mod scenarios;
 mod stability;
+#[path = "../support/stored.rs"]
+mod stored;
 mod taylor;

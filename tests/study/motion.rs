@@ -12,24 +12,15 @@ use pendularm::study::motion::Motion;
 use pendularm::study::stability::{limit_held, limits};
 
 use crate::properties::advised;
-
-fn free<const N: usize>(arm: &Arm<N>, state: &State<N>, method: Method) -> Motion {
-    Motion::ahead(&ControlLoop::free(*arm).with_method(method), state)
-}
+use crate::stored::gains;
 
 /// Whether the energy above that of the hanging arm trebles within `duration`, or the numbers end.
-fn is_lost<const N: usize>(
-    arm: &Arm<N>,
-    state: &State<N>,
-    method: Method,
-    timestep: f64,
-    duration: f64,
-) -> bool {
+fn is_lost<const N: usize>(free: &ControlLoop<N>, state: &State<N>, duration: f64) -> bool {
+    let (arm, timestep) = (&free.arm, free.timestep);
     let mut hanging = [0.0; N];
     hanging[0] = -FRAC_PI_2;
     let lowest = potential_energy(arm, &hanging);
-    let control = ControlLoop::free(*arm).with_method(method);
-    let mut live = control.with_timestep(timestep).simulation(*state);
+    let mut live = free.simulation(*state);
     let most = 3.0 * (energy(arm, state) - lowest);
     let steps = (duration / timestep).ceil() as u64;
     // Not finite is not at most anything.
@@ -38,14 +29,13 @@ fn is_lost<const N: usize>(
 
 #[test]
 fn a_loop_at_rest_without_dynamics_has_no_limit() {
-    let weightless = Arm::new([1.0; 3], [1.0; 3], 0.0).unwrap();
-    let motion = free(&weightless, &State::rest(), Method::Euler);
-    assert_eq!((motion.speed, motion.timestep), (0.0, f64::INFINITY));
-    let at_rest = Motion::ahead(
-        &ControlLoop::new(weightless, Gains::default(), Setpoint::default()),
-        &State::rest(),
-    );
-    assert_eq!((at_rest.speed, at_rest.timestep), (0.0, f64::INFINITY));
+    let weightless = Arm::<3>::default().weightless();
+    let free = ControlLoop::free(weightless).with_method(Method::Euler);
+    let at_rest = ControlLoop::new(weightless, Gains::default(), Setpoint::default());
+    for control in [free, at_rest] {
+        let motion = Motion::ahead(&control, &State::rest());
+        assert_eq!((motion.speed, motion.timestep), (0.0, f64::INFINITY));
+    }
     // Where there is gravity an arm sags a little before its integrals hold it.
     let sagging = ControlLoop::new(Arm::<3>::default(), Gains::default(), Setpoint::default());
     let sagging = Motion::ahead(&sagging, &State::rest());
@@ -68,41 +58,30 @@ fn check_free<const N: usize>(seed: u64, cases: usize) {
     let mut rng = fastrand::Rng::with_seed(seed);
     let (mut within, mut beyond, mut lost) = (0, 0, 0);
     for case in 0..cases {
-        for (method, gravity) in Method::ALL
-            .into_iter()
-            .flat_map(|one| [(one, 0.0), (one, 9.81)])
-        {
+        let methods = Method::ALL.into_iter();
+        for (method, gravity) in methods.flat_map(|one| [(one, 0.0), (one, 9.81)]) {
             let arm = uneven::<N>(&mut rng, gravity);
             let spin = 10.0 * size(&mut rng, 0.7);
-            let state = State {
-                position: std::array::from_fn(|_| TAU * rng.f64()),
-                velocity: std::array::from_fn(|_| {
-                    if gravity == 0.0 {
-                        spin * (2.0 * rng.f64() - 1.0)
-                    } else {
-                        0.0
-                    }
-                }),
-            };
+            let mut state = State::at_rest(std::array::from_fn(|_| TAU * rng.f64()));
+            if gravity == 0.0 {
+                state.velocity = std::array::from_fn(|_| spin * (2.0 * rng.f64() - 1.0));
+            }
             let swings = matches!(method, Method::Euler | Method::Midpoint) && gravity > 0.0;
             if swings {
                 continue;
             }
             // A small swing about the hanging pose is slow, and limited by its frequency.
-            let linear = limit_held(&ControlLoop::free(arm).with_method(method));
-            let limit = free(&arm, &state, method)
-                .timestep
-                .min(linear.unwrap_or(f64::INFINITY));
-            let told = format!("seed {seed} case {case} {method} {arm:?} {state:?} {limit}");
-            if is_lost(&arm, &state, method, 0.8 * limit, 4.0) {
-                println!("{told}");
+            let free = ControlLoop::free(arm).with_method(method);
+            let linear = limit_held(&free).unwrap_or(f64::INFINITY);
+            let limit = Motion::ahead(&free, &state).timestep.min(linear);
+            if is_lost(&free.with_timestep(0.8 * limit), &state, 4.0) {
+                println!("seed {seed} case {case} {method} {arm:?} {state:?} {limit}");
                 within += 1;
             }
             beyond += 1;
-            lost += usize::from(is_lost(&arm, &state, method, 5.0 * limit, 4.0));
+            lost += usize::from(is_lost(&free.with_timestep(5.0 * limit), &state, 4.0));
         }
     }
-    println!("{N} links: of {beyond} arms {within} lost within the limit, {lost} at five times");
     assert!(50 * within <= beyond, "{within} of {beyond}");
     assert!(10 * lost > 6 * beyond, "{lost} of {beyond}");
 }
@@ -126,16 +105,12 @@ fn check_moves<const N: usize>(seed: u64, cases: usize) {
             let (reach, mass): (f64, f64) = (lengths[i..].iter().sum(), masses[i..].iter().sum());
             mass * reach * reach / 3.0
         });
-        let gains = Gains {
-            kp: inertia.map(|inertia| inertia * pace * pace),
-            ki: [0.0; N],
-            kd: inertia.map(|inertia| 2.0 * damping * inertia * pace),
-        };
+        let kp = inertia.map(|inertia| inertia * pace * pace);
+        let kd = inertia.map(|inertia| 2.0 * damping * inertia * pace);
+        let gains = gains(kp, [0.0; N], kd);
         let amplitude = TAU * size(&mut rng, 0.6);
-        let setpoint = Setpoint {
-            position: std::array::from_fn(|_| amplitude * (2.0 * rng.f64() - 1.0)),
-            velocity: [0.0; N],
-        };
+        let position = std::array::from_fn(|_| amplitude * (2.0 * rng.f64() - 1.0));
+        let setpoint = Setpoint::at(position);
         let duration = 20.0 / pace * (1.0 + 2.0 * damping);
         let method = Method::ALL[case % Method::ALL.len()];
         let control = ControlLoop::new(arm, gains, setpoint).with_method(method);
@@ -159,10 +134,8 @@ fn check_moves<const N: usize>(seed: u64, cases: usize) {
         let (peak, off) = run(0.8 * linear.min(motion.timestep));
         assert!(off < 0.2 * amplitude.max(1.0), "{told}: {off} rad off");
         let ratio = motion.speed / peak;
-        assert!(
-            (0.25..4.0).contains(&ratio),
-            "{told}: {ratio} times {peak} rad/s"
-        );
+        let is_near = (0.25..4.0).contains(&ratio);
+        assert!(is_near, "{told}: {ratio} times {peak} rad/s");
     }
 }
 
@@ -176,24 +149,16 @@ fn moves_are_carried_at_a_speed_that_is_known_before() {
 /// starting pose the arm falls by `2 · 9.81` J, which the last link alone might have.
 #[test]
 fn the_speed_assumed_is_that_of_all_energy_in_one_link() {
-    let motion = free(&Arm::<2>::default(), &State::rest(), Method::Rk4);
+    let speed = Motion::ahead(&ControlLoop::free(Arm::<2>::default()), &State::rest()).speed;
     let expected = (2.0 * 2.0 * 9.81 * 48.0 / 7.0_f64).sqrt();
-    assert!(
-        (motion.speed / expected - 1.0).abs() < 1e-12,
-        "{}",
-        motion.speed
-    );
-}
-
-fn two(kp: [f64; 2], ki: [f64; 2], kd: [f64; 2]) -> Gains<2> {
-    Gains { kp, ki, kd }
+    assert!((speed / expected - 1.0).abs() < 1e-12, "{speed}");
 }
 
 /// The integral makes a large move faster: without it 8.76 ms would be advised, which loses the arm after 0.2 s.
 #[test]
 fn integrals_count_in_the_speed_of_a_move() {
     let arm = Arm::new([1.14, 0.91], [5.7, 3.2], 9.81).unwrap();
-    let gains = two([970.0, 170.0], [6600.0, 550.0], [100.0, 36.0]);
+    let gains = gains([970.0, 170.0], [6600.0, 550.0], [100.0, 36.0]);
     let control =
         ControlLoop::new(arm, gains, Setpoint::at([11.8, 0.2])).with_method(Method::Verlet);
     let timestep = advised(&control, &State::rest());

@@ -2,7 +2,6 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec2;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::forward;
@@ -14,6 +13,7 @@ use pendularm::study::paused::at_once;
 use pendularm::study::planner::{self, Candidate, MAX_DURATION, PlanError, Planned, Task};
 
 use crate::reference::state;
+use crate::stored::gains;
 
 pub(crate) fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     at_once(planner::plan(task))
@@ -21,11 +21,35 @@ pub(crate) fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> 
 
 fn swing(duration: f64, error: f64) -> Task<2> {
     Task {
-        control: ControlLoop::free(Arm::default()),
         start: State::at_rest([0.4, -0.3]),
-        duration,
-        error,
+        ..falling(Arm::default(), duration, error)
     }
+}
+
+/// A move from rest, and its continuous law.
+pub(crate) fn moving(
+    gains: Gains<2>,
+    setpoint: [f64; 2],
+    duration: f64,
+    error: f64,
+) -> (Task<2>, Law<2>) {
+    let setpoint = Setpoint::at(setpoint);
+    let control = ControlLoop::new(Arm::default(), gains, setpoint);
+    let task = Task {
+        control,
+        ..falling(Arm::default(), duration, error)
+    };
+    (task, Law::Continuous(gains, setpoint))
+}
+
+/// Plans, and passes if every candidate is within the error for the first seconds.
+fn planned_within(span: f64, task: Task<2>, law: &Law<2>) -> Planned {
+    let planned = plan(task).unwrap();
+    for candidate in &planned.candidates {
+        let seen = error_within(span, &task, law, candidate);
+        assert!(seen <= task.error, "{candidate:?}: {seen:e}");
+    }
+    planned
 }
 
 /// The largest distance of the end effector from the reference within the first seconds, at fifty instants.
@@ -44,9 +68,7 @@ fn error_within<const N: usize>(
     let mut live = control
         .with_timestep(candidate.timestep)
         .simulation(task.start);
-    let tip = |state: &State<N>| -> DVec2 {
-        forward(task.control.arm.lengths(), &state.position).position
-    };
+    let tip = |state: &State<N>| forward(task.control.arm.lengths(), &state.position).position;
     (1..=count)
         .map(|sample| {
             live.advance(every as u64);
@@ -55,73 +77,36 @@ fn error_within<const N: usize>(
         .fold(0.0, f64::max)
 }
 
-/// Under control the held effort causes the error, so that the method with the fewest evaluations
-/// wins.
+/// Under control the held effort causes the error, so that the method with the fewest evaluations wins.
 #[test]
 fn a_planned_move_under_control_stays_within_its_error_of_the_continuous_law() {
-    let (gains, setpoint) = (Gains::default(), Setpoint::at([0.8, -0.6]));
-    let task = Task {
-        control: ControlLoop::new(Arm::<2>::default(), gains, setpoint),
-        start: State::rest(),
-        duration: 2.0,
-        error: 5e-3,
-    };
-    let planned = plan(task).unwrap();
-    for candidate in &planned.candidates {
-        let law = Law::Continuous(gains, setpoint);
-        let seen = error_within(task.duration, &task, &law, candidate);
-        assert!(seen <= task.error, "{candidate:?}: {seen:e}");
-    }
-    let best = planned.best;
-    assert_eq!(best.method, Method::Euler, "{planned:?}");
-    assert!(
-        planned
-            .candidates
-            .is_sorted_by(|one, other| one.evaluations >= other.evaluations)
-    );
+    let (task, law) = moving(Gains::default(), [0.8, -0.6], 2.0, 5e-3);
+    let planned = planned_within(task.duration, task, &law);
+    assert_eq!(planned.best.method, Method::Euler, "{planned:?}");
+    let costs = planned.candidates.iter().map(|one| one.evaluations);
+    assert!(costs.is_sorted_by(|one, other| one >= other));
 }
 
-/// A stiff loop has its largest error in its first milliseconds, a fast link at some angle of every turn: the
-/// planned run is compared after each step.
+/// A stiff loop has its largest error in its first milliseconds, a fast link at some angle of every turn: the planned run
+/// is compared after each step.
 #[test]
 fn no_peak_is_overlooked() {
-    let stiff = |kp, kd, error| {
-        let (gains, setpoint) = (
-            Gains {
-                kp,
-                ki: [0.0; 2],
-                kd,
-            },
-            Setpoint::at([0.5, 0.5]),
-        );
-        let task = Task {
-            control: ControlLoop::new(Arm::<2>::default(), gains, setpoint),
-            start: State::rest(),
-            duration: 4.0,
-            error,
-        };
-        (task, Law::Continuous(gains, setpoint), 0.05)
-    };
+    for (kp, kd, error) in [
+        ([20000.0, 5000.0], [300.0, 60.0], 0.01),
+        ([20000.0, 9000.0], [1000.0, 100.0], 0.003),
+    ] {
+        let (task, law) = moving(gains(kp, [0.0; 2], kd), [0.5, 0.5], 4.0, error);
+        planned_within(0.05, task, &law);
+    }
     let turning = Task {
-        control: ControlLoop::free(Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap()),
         start: State {
             position: [0.0; 2],
             // A turn in 50 ms.
             velocity: [0.0, 40.0 * PI],
         },
-        ..swing(1.0, 0.02)
+        ..falling(Arm::default().weightless(), 1.0, 0.02)
     };
-    for (task, law, span) in [
-        stiff([20000.0, 5000.0], [300.0, 60.0], 0.01),
-        stiff([20000.0, 9000.0], [1000.0, 100.0], 0.003),
-        (turning, Law::FREE, 1.0),
-    ] {
-        let planned = plan(task).unwrap();
-        for candidate in &planned.candidates {
-            let seen = error_within(span, &task, &law, candidate);
-            assert!(seen <= task.error, "{candidate:?}: {seen:e}");
-        }
-    }
+    planned_within(1.0, turning, &Law::FREE);
 }
 
 #[test]
@@ -156,33 +141,19 @@ fn a_plan_has_the_fewest_evaluations_of_all_whole_numbers_of_steps() {
         (falling(long, 10.0, 0.1), 80),
     ] {
         let planned = plan(task).unwrap();
-        let best = planned.best;
-        assert!(
-            best.evaluations <= evaluations,
-            "{evaluations}: {planned:?}"
-        );
+        let is_best = planned.best.evaluations <= evaluations;
+        assert!(is_best, "{evaluations}: {planned:?}");
     }
 }
 
 /// Without an advised timestep nothing is run, and the error gives the reason.
 #[test]
 fn a_plan_without_a_run_gives_the_reason() {
-    let gains = Gains {
-        kp: [20.0, 5.0],
-        ki: [10.0, 2.0],
-        kd: [8.0, 2.0],
-    };
-    let task = Task {
-        control: ControlLoop::new(Arm::<2>::default(), gains, Setpoint::at([0.5, 0.5])),
-        start: State::rest(),
-        duration: 4.0,
-        error: 5e-2,
-    };
+    let gains = gains([20.0, 5.0], [10.0, 2.0], [8.0, 2.0]);
+    let (task, _) = moving(gains, [0.5, 0.5], 4.0, 5e-2);
     let why = plan(task).unwrap_err().to_string();
-    assert!(
-        why.contains("unstable") && !why.contains("4000000"),
-        "{why}"
-    );
+    let is_reason = why.contains("unstable") && !why.contains("4000000");
+    assert!(is_reason, "{why}");
 }
 
 /// A run that has diverged.

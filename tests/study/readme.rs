@@ -1,6 +1,6 @@
 //! The findings of the README and of docs/study.md, run again with the searches and experiments behind them.
 
-use pendularm::math::arm::{Arm, State};
+use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::budget::Budget;
@@ -8,10 +8,9 @@ use pendularm::report::experiments::error::{OUTPUTS, Scene, scenes};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::fewest::fewest;
 use pendularm::study::paused::at_once;
-use pendularm::study::planner::Task;
 use pendularm::study::stability::limits;
 
-use crate::planner::{falling, plan};
+use crate::planner::{falling, moving, plan};
 
 const README: &str = include_str!("../../README.md");
 const STUDY: &str = include_str!("../../docs/study.md");
@@ -50,12 +49,8 @@ fn the_timestep_and_the_evaluations_are_runs() {
     let steps = rk4 / f64::from(Method::Rk4.evaluations());
     agrees(README, "RK4 takes steps of ", duration / steps, 3);
     agrees(README, "**, and ", rk4 / duration, 3);
-    agrees(
-        README,
-        "Verlet needs ",
-        evaluations(Method::Verlet) / rk4,
-        3,
-    );
+    let verlet = evaluations(Method::Verlet) / rk4;
+    agrees(README, "Verlet needs ", verlet, 3);
     // Euler is not within the error in as many steps as a search tries, and takes an evaluation in each.
     let over = printed(README, "as many and Euler over ");
     let tried = 1 << 17;
@@ -81,45 +76,27 @@ fn the_printed_limits_are_those_of_the_loop() {
         limits(&control.with_method(method))
     };
     let (rk4, verlet) = (of(Method::Rk4), of(Method::Verlet));
-    agrees(
-        STUDY,
-        "the 2-link arm goes unstable at ",
-        rk4.held.unwrap(),
-        3,
-    );
-    agrees(STUDY, "with RK4 and at ", verlet.held.unwrap(), 3);
-    agrees(
-        STUDY,
-        "RK4 would be stable up to ",
-        rk4.continuous.unwrap(),
-        3,
-    );
-    agrees(
-        STUDY,
-        "limit of all poses is ",
-        rk4.minimum_held.unwrap(),
-        3,
-    );
+    for (before, limit) in [
+        ("the 2-link arm goes unstable at ", rk4.held),
+        ("with RK4 and at ", verlet.held),
+        ("RK4 would be stable up to ", rk4.continuous),
+        ("limit of all poses is ", rk4.minimum_held),
+    ] {
+        agrees(STUDY, before, limit.unwrap(), 3);
+    }
 }
 
 /// The number that follows `before` in a document, in the unit that follows it.
 fn printed(text: &str, before: &str) -> f64 {
-    let after = text
-        .split_once(before)
-        .unwrap_or_else(|| panic!("{before}"))
-        .1;
+    let parts = text.split_once(before);
+    let (_, after) = parts.unwrap_or_else(|| panic!("{before}"));
     let mut words = after.split(|c: char| c.is_whitespace() || "*,;".contains(c));
     let mut number = words.next().unwrap().to_owned();
     if let Some((mantissa, power)) = number.clone().split_once("·10") {
-        let digits = power.chars().map(|digit| match digit {
-            '⁻' => '-',
-            _ => char::from_digit(
-                "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|one| one == digit).unwrap() as u32,
-                10,
-            )
-            .unwrap(),
-        });
-        number = format!("{mantissa}e{}", digits.collect::<String>());
+        let place = |digit| "⁰¹²³⁴⁵⁶⁷⁸⁹⁻".chars().position(|one| one == digit).unwrap();
+        let plain = |digit| "0123456789-".chars().nth(place(digit)).unwrap();
+        let power: String = power.chars().map(plain).collect();
+        number = format!("{mantissa}e{power}");
     }
     let unit = match words.next().map(|unit| unit.trim_end_matches('.')) {
         Some("ms") => 1e-3,
@@ -133,30 +110,16 @@ fn printed(text: &str, before: &str) -> f64 {
 /// The plans of docs/study.md are run again.
 #[test]
 fn the_plans_of_the_study_are_runs() {
-    let move_under_control = Task {
-        control: ControlLoop::new(
-            Arm::<2>::default(),
-            Gains::default(),
-            Setpoint::at([0.8, -0.6]),
-        ),
-        start: State::rest(),
-        duration: 4.0,
-        error: 0.01,
-    };
+    let (reach, _) = moving(Gains::default(), [0.8, -0.6], 4.0, 0.01);
+    let fall = falling(Arm::default(), 10.0, 1e-6);
     for (task, before, method) in [
-        (move_under_control, "the plan is Euler with ", Method::Euler),
-        (
-            falling(Arm::default(), 10.0, 1e-6),
-            "the plan is RK4 with ",
-            Method::Rk4,
-        ),
+        (reach, "the plan is Euler with ", Method::Euler),
+        (fall, "the plan is RK4 with ", Method::Rk4),
     ] {
         let planned = plan(task).unwrap();
         let best = planned.best;
         assert_eq!(best.method, method, "{planned:?}");
-        assert!(
-            (printed(STUDY, before) / best.timestep - 1.0).abs() < 5e-3,
-            "{planned:?}"
-        );
+        let off = printed(STUDY, before) / best.timestep - 1.0;
+        assert!(off.abs() < 5e-3, "{planned:?}");
     }
 }

@@ -1,26 +1,35 @@
 //! `pendularm report`: files, resuming, refusals. Their contents are tested in the study.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use pendularm::report::{ReportOptions, run};
+use pendularm::report::{ReportError, ReportOptions, run};
+use serde_json::Value;
 
 use crate::folder::Folder;
 
-fn quick(out: &Path, only: &[&str]) -> ReportOptions {
-    ReportOptions {
+/// Makes these sections quickly.
+fn make(out: &Path, only: &[&str]) -> Result<PathBuf, ReportError> {
+    run(&ReportOptions {
         out: out.to_owned(),
         only: only.iter().map(|&name| name.to_owned()).collect(),
         quick: true,
-    }
+    })
+}
+
+/// The text of the page with these sections, and the report in numbers.
+fn made(out: &Path, only: &[&str]) -> (String, Value) {
+    let page = make(out, only).unwrap();
+    let report = fs::read_to_string(out.join("report.json")).unwrap();
+    let html = fs::read_to_string(page).unwrap();
+    (html, serde_json::from_str(&report).unwrap())
 }
 
 #[test]
 fn a_section_leaves_page_figures_and_numbers() {
     let folder = Folder::new("report-files");
     let out = folder.join("out");
-    let page = run(&quick(&out, &["conditioning"])).unwrap();
-    let html = fs::read_to_string(page).unwrap();
+    let (html, _) = made(&out, &["conditioning"]);
     assert!(html.contains("<svg class=\"plot\""));
     // Self-contained: nothing is fetched, nothing is run.
     for fetched in ["src=", "@import", "url(", "<script", "<link"] {
@@ -30,9 +39,8 @@ fn a_section_leaves_page_figures_and_numbers() {
         assert!(out.join(file).exists(), "{file}");
     }
     let svg = fs::read_to_string(out.join("conditioning.svg")).unwrap();
-    assert!(
-        svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"") && svg.contains("<style>")
-    );
+    let is_picture = svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"");
+    assert!(is_picture && svg.contains("<style>"));
     // Three poses, three ways of solving, 19 mass ratios, and the head.
     let csv = fs::read_to_string(out.join("conditioning.csv")).unwrap();
     assert_eq!(csv.lines().count(), 3 * 3 * 19 + 1);
@@ -42,12 +50,9 @@ fn a_section_leaves_page_figures_and_numbers() {
 #[test]
 fn several_sections_are_made_and_shown_in_their_order() {
     let out = Folder::new("report-several");
-    let page = run(&quick(&out, &["scenarios", "conditioning", "drift"])).unwrap();
-    let html = fs::read_to_string(page).unwrap();
+    let (html, report) = made(&out, &["scenarios", "conditioning", "drift"]);
     let at = |name: &str| html.find(&format!("<section id=\"{name}\">")).unwrap();
     assert!(at("scenarios") < at("drift") && at("drift") < at("conditioning"));
-    let report = fs::read_to_string(out.join("report.json")).unwrap();
-    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     for section in report["sections"].as_array().unwrap() {
         for verdict in section["verdicts"].as_array().unwrap() {
             assert_eq!(verdict["holds"], true, "{verdict}");
@@ -58,15 +63,14 @@ fn several_sections_are_made_and_shown_in_their_order() {
 #[test]
 fn a_section_made_anew_keeps_the_others() {
     let out = Folder::new("report-resume");
-    run(&quick(&out, &["conditioning"])).unwrap();
-    let first = fs::read_to_string(out.join("sections/conditioning.json")).unwrap();
-    let page = run(&quick(&out, &["drift"])).unwrap();
-    let html = fs::read_to_string(page).unwrap();
-    assert!(
-        html.contains("<section id=\"conditioning\">") && html.contains("<section id=\"drift\">")
-    );
-    let kept = fs::read_to_string(out.join("sections/conditioning.json")).unwrap();
-    assert_eq!(first, kept);
+    let section = out.join("sections/conditioning.json");
+    made(&out, &["conditioning"]);
+    let first = fs::read_to_string(&section).unwrap();
+    let (html, _) = made(&out, &["drift"]);
+    for name in ["conditioning", "drift"] {
+        assert!(html.contains(&format!("<section id=\"{name}\">")), "{name}");
+    }
+    assert_eq!(first, fs::read_to_string(&section).unwrap());
 }
 
 /// Made by another version, or cut: the command must refuse it and not leave it out silently.
@@ -76,7 +80,7 @@ fn an_unreadable_kept_section_is_reported_with_its_file() {
     let kept = out.join("sections/drift.json");
     fs::create_dir_all(kept.parent().unwrap()).unwrap();
     fs::write(&kept, "{}").unwrap();
-    let error = run(&quick(&out, &["conditioning"])).unwrap_err();
+    let error = make(&out, &["conditioning"]).unwrap_err();
     let said = error.to_string();
     assert!(said.contains(kept.to_str().unwrap()), "{said}");
     assert!(said.contains("missing field"), "{said}");
@@ -88,14 +92,11 @@ fn an_unreadable_kept_section_is_reported_with_its_file() {
 #[test]
 fn every_line_and_every_count_of_the_work_is_shown() {
     let out = Folder::new("report-work");
-    let page = run(&quick(&out, &["work"])).unwrap();
-    let html = fs::read_to_string(page).unwrap();
+    let (html, report) = made(&out, &["work"]);
     assert!(!html.contains("not measured"));
     assert!(html.contains("counted with pendularm "), "no version");
-    let report = fs::read_to_string(out.join("report.json")).unwrap();
-    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     let work = &report["sections"][0];
-    let count = |list: &serde_json::Value| list.as_array().unwrap().len();
+    let count = |list: &Value| list.as_array().unwrap().len();
     let lines = |text: &str| text.lines().count();
     let left_out = include_str!("../../src/report/figures/left_out.txt");
     assert_eq!(count(&work["tables"][0]["rows"]), lines(left_out) - 1);

@@ -1,14 +1,16 @@
 //! Offline runs and their errors, and the local error of a step.
 
 use pendularm::math::arm::{Arm, State};
-use pendularm::math::integrator::Method;
+use pendularm::math::dynamics::forward_dynamics;
+use pendularm::math::integrator::{Method, increment};
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::Simulation;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::estimate;
 use pendularm::study::paused::{Paused, at_once};
 use pendularm::study::rollout::{MAX_SAMPLES, Rollout, RolloutRequest, rollout};
 use pendularm::study::taylor::TaylorReference;
+
+use crate::stored::gains;
 
 fn swing() -> RolloutRequest<2> {
     RolloutRequest {
@@ -24,14 +26,13 @@ fn swing() -> RolloutRequest<2> {
 }
 
 fn reach() -> RolloutRequest<2> {
-    let gains = Gains {
-        kp: [200.0, 100.0],
-        ki: [20.0, 10.0],
-        kd: [30.0, 12.0],
-    };
+    controlled(gains([200.0, 100.0], [20.0, 10.0], [30.0, 12.0]), 0.01)
+}
+
+fn controlled(gains: Gains<2>, timestep: f64) -> RolloutRequest<2> {
     let control = ControlLoop::new(Arm::default(), gains, Setpoint::at([1.0, -0.5]));
     RolloutRequest {
-        control: control.with_timestep(0.01),
+        control: control.with_timestep(timestep),
         ..swing()
     }
 }
@@ -77,19 +78,9 @@ fn a_run_has_the_nearest_number_of_steps() {
 /// The two references agree to rounding: a second of this motion amplifies errors some ten times.
 #[test]
 fn the_references_agree_to_rounding() {
-    let stiff = Gains {
-        kp: [1e5; 2],
-        ki: [1e3; 2],
-        kd: [1e3; 2],
-    };
-    let control = ControlLoop::new(Arm::default(), stiff, Setpoint::at([1.0, -0.5]));
-    let stiff = RolloutRequest {
-        control: control.with_timestep(1e-4),
-        ..swing()
-    };
+    let stiff = controlled(gains([1e5; 2], [1e3; 2], [1e3; 2]), 1e-4);
     for request in [swing(), reach(), stiff] {
-        let made = run(request);
-        let deviation = made.deviation.unwrap();
+        let deviation = run(request).deviation.unwrap();
         assert_eq!(deviation.samples, 11);
         let uncertainty = deviation.uncertainty;
         assert!(uncertainty < 2e-14, "{uncertainty:e}");
@@ -101,10 +92,7 @@ fn the_references_agree_to_rounding() {
 /// runs with different bits.
 #[test]
 fn an_error_of_one_size_with_its_uncertainty_is_not_known() {
-    let from_rest = State {
-        position: [0.4, -0.3],
-        velocity: [0.0; 2],
-    };
+    let from_rest = State::at_rest([0.4, -0.3]);
     let deviation = |timestep, start, duration| {
         let request = RolloutRequest {
             control: swing().control.with_timestep(timestep),
@@ -117,20 +105,11 @@ fn an_error_of_one_size_with_its_uncertainty_is_not_known() {
     };
     let tiny = deviation(1e-5, from_rest, 5.0);
     assert!(tiny.error > 0.0 && tiny.uncertainty > 0.0);
-    assert_eq!(
-        tiny.known(),
-        None,
-        "{:e} ± {:e}",
-        tiny.error,
-        tiny.uncertainty
-    );
     let chaos = deviation(1e-3, State::rest(), 40.0);
     assert_eq!(
-        chaos.known(),
-        None,
-        "{} ± {}",
-        chaos.error,
-        chaos.uncertainty
+        [tiny.known(), chaos.known()],
+        [None; 2],
+        "{tiny:?} {chaos:?}"
     );
     let plain = deviation(1e-2, from_rest, 5.0);
     assert_eq!(plain.known(), Some(plain.error));
@@ -180,11 +159,7 @@ fn a_run_in_short_pieces_gives_the_same_bits_as_one_made_at_once_however_wild_th
 
 #[test]
 fn a_run_that_diverges_ends_with_its_last_finite_sample() {
-    let gains = Gains {
-        kp: [1e6; 2],
-        ki: [0.0; 2],
-        kd: [0.0; 2],
-    };
+    let gains = gains([1e6; 2], [0.0; 2], [0.0; 2]);
     let control = ControlLoop::new(Arm::default(), gains, Setpoint::default());
     let made = run(RolloutRequest {
         control: control.with_method(Method::Euler).with_timestep(0.1),
@@ -206,40 +181,26 @@ fn a_run_whose_work_is_not_bounded_is_refused() {
         change(&mut request);
         at_once(rollout(request)).unwrap_err().to_string()
     };
-    type Row<'a> = (&'a dyn Fn(&mut RolloutRequest<2>), &'a str);
-    let rows: [Row<'_>; 7] = [
-        (
-            &|ask| ask.control.timestep = 0.0,
-            "timestep must be finite and greater than 0, got 0",
-        ),
+    type Row<'a> = (&'a dyn Fn(&mut RolloutRequest<2>), &'a str, &'a str);
+    let positive = "must be finite and greater than 0, got";
+    let rows: [Row<'_>; 5] = [
+        (&|ask| ask.control.timestep = 0.0, "timestep", "0"),
         (
             &|ask| (ask.duration, ask.control.timestep) = (-1.0, -0.01),
-            "duration must be finite and greater than 0, got -1",
+            "duration",
+            "-1",
         ),
-        (
-            &|ask| ask.duration = f64::INFINITY,
-            "duration must be finite and greater than 0, got inf",
-        ),
-        (
-            &|ask| ask.duration = f64::NAN,
-            "duration must be finite and greater than 0, got NaN",
-        ),
-        (
-            &|ask| ask.control.timestep = f64::NAN,
-            "timestep must be finite and greater than 0, got NaN",
-        ),
-        (
-            &|ask| ask.control.timestep = 1e-300,
-            "duration / timestep must be at most 1e7 steps, got 1e300",
-        ),
-        (
-            &|ask| ask.samples = 1,
-            "samples must be between 2 and 100000, got 1",
-        ),
+        (&|ask| ask.duration = f64::INFINITY, "duration", "inf"),
+        (&|ask| ask.duration = f64::NAN, "duration", "NaN"),
+        (&|ask| ask.control.timestep = f64::NAN, "timestep", "NaN"),
     ];
-    for (change, message) in rows {
-        assert_eq!(with(change), message);
+    for (change, name, got) in rows {
+        assert_eq!(with(change), format!("{name} {positive} {got}"));
     }
+    let many = "duration / timestep must be at most 1e7 steps, got 1e300";
+    assert_eq!(with(&|ask| ask.control.timestep = 1e-300), many);
+    let few = "samples must be between 2 and 100000, got 1";
+    assert_eq!(with(&|ask| ask.samples = 1), few);
 }
 
 /// The true local error is that against the arm followed to rounding. Where a step is well resolved, what the estimate
@@ -252,10 +213,8 @@ fn the_error_of_a_step_is_estimated_at_rest_and_in_motion() {
     };
     // The arm is released at rest, so the error's leading term vanishes for midpoint and Verlet.
     for (state, effort) in [(moving, [3.0, -1.0, 0.5]), (State::rest(), [0.0; 3])] {
-        for (method, h) in Method::ALL
-            .into_iter()
-            .flat_map(|one| [(one, 4e-3), (one, 1e-2)])
-        {
+        let methods = Method::ALL.into_iter();
+        for (method, h) in methods.flat_map(|one| [(one, 4e-3), (one, 1e-2)]) {
             let arm = Arm::<3>::default();
             let control = ControlLoop::free(arm).with_method(method);
             let mut simulation = control.with_timestep(h).simulation(state);
@@ -263,30 +222,19 @@ fn the_error_of_a_step_is_estimated_at_rest_and_in_motion() {
             let estimate = estimate(&simulation).unwrap();
             let mut truth = TaylorReference::new(state);
             assert!(truth.follow(&arm, &effort, h));
-            let (dq, dv) = pendularm::math::integrator::increment(
-                method,
-                |_, q, v| pendularm::math::dynamics::forward_dynamics(&arm, q, v, &effort),
-                0.0,
-                &state.position,
-                &state.velocity,
-                h,
-            );
-            let error = (0..3)
-                .map(|i| ((truth.state().position[i] - state.position[i]) - dq[i]).abs())
-                .fold(0.0, f64::max);
-            let ratio = estimate.local_error / error;
-            assert!(
-                (ratio - 1.0).abs() < 0.06,
-                "{method} {h}: {ratio} of {error:e}"
-            );
-            let error = (0..3)
-                .map(|i| ((truth.state().velocity[i] - state.velocity[i]) - dv[i]).abs())
-                .fold(0.0, f64::max);
-            let ratio = estimate.velocity_error / error;
-            assert!(
-                (ratio - 1.0).abs() < 0.06,
-                "{method} {h}: {ratio} of {error:e} rad/s"
-            );
+            let acceleration =
+                |_, q: &[f64; 3], v: &[f64; 3]| forward_dynamics(&arm, q, v, &effort);
+            let (q, v) = (&state.position, &state.velocity);
+            let (dq, dv) = increment(method, acceleration, 0.0, q, v, h);
+            let (end, end_rate) = (truth.state().position, truth.state().velocity);
+            for (told, estimate, from, to, step) in [
+                ("rad", estimate.local_error, q, end, dq),
+                ("rad/s", estimate.velocity_error, v, end_rate, dv),
+            ] {
+                let error = (0..3).map(|i| ((to[i] - from[i]) - step[i]).abs());
+                let ratio = estimate / error.fold(0.0, f64::max);
+                assert!((ratio - 1.0).abs() < 0.06, "{method} {h}: {ratio} {told}");
+            }
             assert_eq!(estimate.error_per_second, estimate.local_error / h);
         }
     }
@@ -294,20 +242,9 @@ fn the_error_of_a_step_is_estimated_at_rest_and_in_motion() {
 
 #[test]
 fn a_diverged_simulation_has_no_estimate() {
-    let mut live = Simulation::<2>::new(
-        Arm::default(),
-        Gains {
-            kp: [1e9; 2],
-            ki: [0.0; 2],
-            kd: [0.0; 2],
-        },
-    );
-    live.enable(true);
-    live.set_setpoint(Setpoint {
-        position: [1.0; 2],
-        velocity: [0.0; 2],
-    });
-    live.set_timestep(1.0);
+    let gains = gains([1e9; 2], [0.0; 2], [0.0; 2]);
+    let control = ControlLoop::new(Arm::default(), gains, Setpoint::at([1.0; 2]));
+    let mut live = control.with_timestep(1.0).simulation(State::rest());
     live.advance(1_000_000);
     assert!(live.divergence().is_some());
     assert!(estimate(&live).is_none());

@@ -1,25 +1,7 @@
-//! The named scenes of the study: the quick ones here, the others in the report.
+//! The named scenes of the study. `report.rs` runs the quick ones.
 
-use pendularm::report::experiments::scenarios::{Scenario, all};
+use pendularm::report::experiments::scenarios::all;
 use pendularm::report::scenes::live_scenes;
-
-fn check(scenes: impl Iterator<Item = Scenario>) {
-    let mut failed = vec![];
-    for scene in scenes {
-        let begun = std::time::Instant::now();
-        let (holds, observed) = scene.run();
-        let mark = if holds { "holds" } else { "FALLS SHORT" };
-        let line = format!(
-            "{} {mark}: {} (expected: {})",
-            scene.id, observed, scene.expected
-        );
-        println!("{line} [{:.2?}]", begun.elapsed());
-        if !holds {
-            failed.push(line);
-        }
-    }
-    assert!(failed.is_empty(), "{failed:#?}");
-}
 
 #[test]
 fn there_are_39_scenes_in_order() {
@@ -33,15 +15,14 @@ fn there_are_39_scenes_in_order() {
     }
 }
 
-#[test]
-fn every_quick_scene_is_as_expected() {
-    check(all().into_iter().filter(|scene| !scene.slow));
-}
-
+/// A quick report has the other ones.
 #[test]
 #[ignore = "takes some seconds; the report runs them"]
 fn every_slow_scene_is_as_expected() {
-    check(all().into_iter().filter(|scene| scene.slow));
+    for scene in all().into_iter().filter(|scene| scene.slow) {
+        let (holds, observed) = scene.run();
+        assert!(holds, "{}: {observed}, not {}", scene.id, scene.expected);
+    }
 }
 
 /// Each scene has a picture of a live arm, or a reason why there is none; a link spells all of the arm's settings.
@@ -55,11 +36,11 @@ fn scenes_are_shown_by_live_arms() {
         };
         assert!(watched.samples.len() > 1, "{}", scene.id);
         let fragment = &watched.fragment;
-        for name in [
+        let names = [
             "links", "method", "timestep", "masses", "period", "position",
-        ] {
-            assert!(fragment.contains(&format!("{name}=")), "{fragment}");
-        }
+        ];
+        let is_spelled = |name: &str| fragment.contains(&format!("{name}="));
+        assert!(names.into_iter().all(is_spelled), "{fragment}");
         if watched.diverged {
             diverged.push(scene.id);
         }

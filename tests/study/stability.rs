@@ -13,113 +13,39 @@ use pendularm::study::linear::{Linear, equilibrium};
 use pendularm::study::stability::{
     Rest, Sampling, Stepping, largest_timestep, limit_held, limits, step_matrix,
 };
-use serde::Deserialize;
+use serde_json::Value;
 
 use crate::equilibrium::residual;
+use crate::stored::{arm, array, entries, for_links, gains, list, method, number};
 
-#[derive(Deserialize)]
-struct Oracle {
-    cases: Vec<Case>,
-}
-
-#[derive(Deserialize)]
-#[serde(tag = "type", rename_all = "lowercase")]
-enum Case {
-    Linear(LinearCase),
-    Arm(ArmCase),
-}
-
-/// `ẍ = -ω² x - 2 z ω ẋ` at ω = 1.
-#[derive(Deserialize)]
-struct LinearCase {
-    method: String,
-    z: f64,
-    h_max: f64,
-    samples: Vec<Sample>,
-}
-
-#[derive(Deserialize)]
-struct Sample {
-    h: f64,
-    #[serde(rename = "A")]
-    matrix: [[f64; 2]; 2],
-    rho: f64,
-}
-
-/// An arm under proportional and derivative control.
-#[derive(Deserialize)]
-struct ArmCase {
-    n: usize,
-    configuration: String,
-    gains: String,
-    masses: Vec<f64>,
-    lengths: Vec<f64>,
-    gravity: f64,
-    kp: Vec<f64>,
-    kd: Vec<f64>,
-    setpoint: Vec<f64>,
-    equilibrium: Vec<f64>,
-    methods: Vec<MethodCase>,
-}
-
-#[derive(Deserialize)]
-struct MethodCase {
-    control: String,
-    method: String,
-    dt_max: f64,
-}
-
-fn oracle() -> Vec<Case> {
-    let oracle: Oracle = serde_json::from_str(include_str!("../data/stability.json")).unwrap();
-    oracle.cases
-}
-
-fn array<const N: usize>(values: &[f64]) -> [f64; N] {
-    values.try_into().unwrap()
-}
-
-impl ArmCase {
-    fn parts<const N: usize>(&self) -> (Arm<N>, Gains<N>, Setpoint<N>) {
-        let arm = Arm::new(array(&self.lengths), array(&self.masses), self.gravity).unwrap();
-        let gains = Gains {
-            kp: array(&self.kp),
-            ki: [0.0; N],
-            kd: array(&self.kd),
-        };
-        let setpoint = Setpoint {
-            position: array(&self.setpoint),
-            velocity: [0.0; N],
-        };
-        (arm, gains, setpoint)
-    }
+/// The stored cases of a type: oscillators `ẍ = -ω² x - 2 z ω ẋ` at ω = 1, and arms under proportional and derivative
+/// control.
+fn stored(kind: &str) -> Vec<Value> {
+    let mut cases = entries(include_str!("../data/stability.json"), "cases");
+    cases.retain(|case| case["type"] == kind);
+    assert!(!cases.is_empty());
+    cases
 }
 
 /// For an oscillator at ω = 1 the state is `(x, v)`, as the stored matrices have it. Entries are sums of terms `(h λ)^k / k!`
 /// with `λ <= 1 + 2 z`, each a few times rounded.
 #[test]
 fn the_step_matrix_of_an_oscillator_is_the_stored_one() {
-    for case in oracle() {
-        let Case::Linear(case) = case else { continue };
-        let method: Method = case.method.parse().unwrap();
-        let oscillator = Linear::oscillator(1.0, 0.0, 0.0, 2.0 * case.z);
-        for sample in &case.samples {
-            let matrix = step_matrix(&oscillator, method, Sampling::Continuous, sample.h);
-            let size = sample.h * (1.0 + 2.0 * case.z);
+    for case in stored("linear") {
+        let (method, z) = (method(&case), number(&case["z"]));
+        let oscillator = Linear::oscillator(1.0, 0.0, 0.0, 2.0 * z);
+        for sample in case["samples"].as_array().unwrap() {
+            let h = number(&sample["h"]);
+            let matrix = step_matrix(&oscillator, method, Sampling::Continuous, h);
+            let size = h * (1.0 + 2.0 * z);
             let scale = 1.0 + size * (1.0 + size * (0.5 + size * (1.0 / 6.0 + size / 24.0)));
-            for row in 0..2 {
-                for column in 0..2 {
-                    let error = (matrix[(row, column)] - sample.matrix[row][column]).abs();
-                    assert!(
-                        error < 4e-16 * scale,
-                        "{method} z {} h {}",
-                        case.z,
-                        sample.h
-                    );
-                }
+            for (at, expected) in list(&sample["A"]).into_iter().enumerate() {
+                let error = (matrix[(at / 2, at % 2)] - expected).abs();
+                assert!(error < 4e-16 * scale, "{method} z {z} h {h}");
             }
             // A double eigenvalue keeps half of the digits.
-            let error = (matrix.spectral_radius() - sample.rho).abs();
-            assert!(error < 1e-7 * scale, "{method} z {} h {}", case.z, sample.h);
+            let error = (matrix.spectral_radius() - number(&sample["rho"])).abs();
+            assert!(error < 1e-7 * scale, "{method} z {z} h {h}");
         }
     }
 }
@@ -128,54 +54,41 @@ fn the_step_matrix_of_an_oscillator_is_the_stored_one() {
 /// two eigenvalues meet on the circle (z = 0, 1/2, 1) half of their digits are lost.
 #[test]
 fn the_limit_of_an_oscillator_is_the_stored_one() {
-    let mut worst: f64 = 0.0;
-    for case in oracle() {
-        let Case::Linear(case) = case else { continue };
-        let method: Method = case.method.parse().unwrap();
-        let oscillator = Linear::oscillator(1.0, 0.0, 0.0, 2.0 * case.z);
+    for case in stored("linear") {
+        let (method, z, expected) = (method(&case), number(&case["z"]), number(&case["h_max"]));
+        let oscillator = Linear::oscillator(1.0, 0.0, 0.0, 2.0 * z);
         let limit = largest_timestep(&oscillator, method, Sampling::Continuous).unwrap();
-        let error = if case.h_max == 0.0 {
-            limit
-        } else {
-            (limit / case.h_max - 1.0).abs()
-        };
-        let double = [0.0, 0.5, 1.0].contains(&case.z);
-        assert!(error < if double { 5e-8 } else { 1e-9 });
-        worst = worst.max(error);
-    }
-    println!("worst {worst:e}");
-}
-
-fn check_arm<const N: usize>(case: &ArmCase, worst: &mut f64) {
-    let (arm, gains, setpoint) = case.parts::<N>();
-    let control = ControlLoop::new(arm, gains, setpoint);
-    let rest = equilibrium(&control);
-    for i in 0..N {
-        let error = (rest.position[i] - case.equilibrium[i]).abs();
+        let is_double = [0.0, 0.5, 1.0].contains(&z);
+        let tolerance = if is_double { 5e-8 } else { 1e-9 };
+        let scale = if expected == 0.0 { 1.0 } else { expected };
         assert!(
-            error < 1e-14,
-            "{} {}: {error:e}",
-            case.configuration,
-            case.gains
+            (limit - expected).abs() < tolerance * scale,
+            "{method} z {z}"
         );
     }
+}
+
+fn check_arm<const N: usize>(case: &Value) {
+    let gains = gains(array(&case["kp"]), [0.0; N], array(&case["kd"]));
+    let control = ControlLoop::new(arm(case), gains, Setpoint::at(array(&case["setpoint"])));
+    let rest = equilibrium(&control);
+    let told = format!("{N} {} {}", case["configuration"], case["gains"]);
+    for (angle, expected) in rest.position.iter().zip(list(&case["equilibrium"])) {
+        assert!((angle - expected).abs() < 1e-14, "{told}: {angle}");
+    }
     let linear = Linear::at(&control, &rest.position, &rest.integrating);
-    for expected in &case.methods {
-        let method: Method = expected.method.parse().unwrap();
-        let sampling = match expected.control.as_str() {
+    for expected in case["methods"].as_array().unwrap() {
+        let sampling = match expected["control"].as_str().unwrap() {
             "zoh" => Sampling::Held,
             "continuous" => Sampling::Continuous,
             other => panic!("what is {other}?"),
         };
-        let limit = largest_timestep(&linear, method, sampling).unwrap();
-        let error = (limit / expected.dt_max - 1.0).abs();
-        if error > 1e-9 {
-            println!(
-                "{N} {} {} {method} {}: {limit:e} for {:e}, off by {error:e}",
-                case.configuration, case.gains, expected.control, expected.dt_max
-            );
-        }
-        *worst = worst.max(error);
+        let limit = largest_timestep(&linear, method(expected), sampling).unwrap();
+        let error = (limit / number(&expected["dt_max"]) - 1.0).abs();
+        assert!(
+            error < 1e-10,
+            "{told} {expected}: {limit:e}, off by {error:e}"
+        );
     }
 }
 
@@ -183,17 +96,9 @@ fn check_arm<const N: usize>(case: &ArmCase, worst: &mut f64) {
 /// 1e-11 on.
 #[test]
 fn the_limits_of_the_arm_are_the_stored_ones() {
-    let mut worst: f64 = 0.0;
-    for case in oracle() {
-        let Case::Arm(case) = case else { continue };
-        match case.n {
-            2 => check_arm::<2>(&case, &mut worst),
-            3 => check_arm::<3>(&case, &mut worst),
-            n => panic!("{n} links?"),
-        }
+    for case in stored("arm") {
+        for_links!(case, check_arm(&case));
     }
-    println!("worst {worst:e}");
-    assert!(worst < 1e-10);
 }
 
 /// Sampled control on a single inertia, in the shipped order (the integral takes up the error before it is used), with the
@@ -201,21 +106,16 @@ fn the_limits_of_the_arm_are_the_stored_ones() {
 #[test]
 fn the_held_law_is_stepped_in_the_shipped_order() {
     let (kp, ki, kd, h) = (30.0, 40.0, 7.0, 0.05);
-    let matrix = step_matrix(
-        &Linear::oscillator(0.0, kp, ki, kd),
-        Method::Rk4,
-        Sampling::Held,
-        h,
-    );
+    let inertia = Linear::oscillator(0.0, kp, ki, kd);
+    let matrix = step_matrix(&inertia, Method::Rk4, Sampling::Held, h);
     for start in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
         let [x, v, s]: [f64; 3] = start;
         let s = s - h * x;
         let u = -kp * x - kd * v + ki * s;
         let expected = [x + h * v + 0.5 * h * h * u, v + h * u, s];
         for (row, expected) in expected.into_iter().enumerate() {
-            let found: f64 = (0..3)
-                .map(|column| matrix[(row, column)] * start[column])
-                .sum();
+            let products = (0..3).map(|column| matrix[(row, column)] * start[column]);
+            let found: f64 = products.sum();
             // Three products of at most 2.
             assert!((found - expected).abs() < 1e-15, "{start:?} {row}");
         }
@@ -225,22 +125,16 @@ fn the_held_law_is_stepped_in_the_shipped_order() {
 /// With an integral at every joint the arm rests at the setpoint, as long as the integral can carry the load.
 #[test]
 fn an_integral_holds_the_setpoint_and_a_weak_one_does_not() {
-    let setpoint = Setpoint {
-        position: [0.0, 0.0],
-        velocity: [0.0; 2],
+    let control = |ki| {
+        let gains = gains([100.0; 2], [ki; 2], [10.0; 2]);
+        ControlLoop::new(Arm::default(), gains, Setpoint::default())
     };
-    let gains = |ki| Gains {
-        kp: [100.0; 2],
-        ki: [ki; 2],
-        kd: [10.0; 2],
-    };
-    let arm = Arm::default();
-    let rest = equilibrium(&ControlLoop::new(arm, gains(10.0), setpoint));
+    let rest = equilibrium(&control(10.0));
     assert_eq!((rest.position, rest.integrating), ([0.0; 2], [true; 2]));
     // Horizontal: 1.5 + 0.5 times m g l at the shoulder, half of m g l at the elbow.
     assert!((rest.integral[0] - 1.962).abs() < 1e-12 && (rest.integral[1] - 0.4905).abs() < 1e-12);
     // 19.62 N m is beyond 0.1 times 50 rad s: that joint sags under what is left, the other one still holds.
-    let weak = ControlLoop::new(arm, gains(0.1), setpoint);
+    let weak = control(0.1);
     let rest = equilibrium(&weak);
     assert_eq!((rest.integral[0], rest.integrating), (50.0, [false, true]));
     assert!(rest.position[0] < -0.1 && rest.position[1] == 0.0);
@@ -271,23 +165,18 @@ fn the_advised_timestep_is_a_part_of_the_smallest_over_poses() {
 fn a_free_arm_has_the_limits_of_its_swing() {
     let swing = |method| limits(&ControlLoop::free(Arm::<3>::default()).with_method(method));
     for method in [Method::Euler, Method::Midpoint] {
-        assert_eq!(
-            (swing(method).held, swing(method).minimum_held),
-            (Some(0.0), Some(0.0))
-        );
+        let found = swing(method);
+        assert_eq!([found.held, found.minimum_held], [Some(0.0); 2]);
     }
     // 2 and 2 sqrt 2 per fastest mode: the same ratio for every mode. Growth counts from 1e-11 on.
     let (verlet, rk4) = (swing(Method::Verlet), swing(Method::Rk4));
     let ratio = rk4.held.unwrap() / verlet.held.unwrap();
     assert!((ratio - 2.0_f64.sqrt()).abs() < 1e-6, "{ratio}");
     assert_eq!(verlet.held, verlet.continuous);
-    let weightless = Arm::new([1.0; 3], [1.0; 3], 0.0).unwrap();
     for method in Method::ALL {
-        let limits = limits(&ControlLoop::free(weightless).with_method(method));
-        assert_eq!(
-            (limits.held, limits.minimum_held, limits.advised),
-            (None, None, None)
-        );
+        let weightless = ControlLoop::free(Arm::<3>::default().weightless());
+        let found = limits(&weightless.with_method(method));
+        assert_eq!([found.held, found.minimum_held, found.advised], [None; 3]);
     }
 }
 
@@ -300,23 +189,15 @@ fn no_parameters_make_a_limit_that_is_no_number() {
         for (m, gain) in gains.into_iter().enumerate() {
             let arm =
                 Arm::new([length, 1.0, sizes[m]], [1.0, sizes[4 - k], 1.0], gains[k]).unwrap();
-            let gains = Gains {
-                kp: [gain; 3],
-                ki: [gains[k]; 3],
-                kd: [gains[4 - m], 1.0, 0.0],
-            };
+            let gains = crate::stored::gains([gain; 3], [gains[k]; 3], [gains[4 - m], 1.0, 0.0]);
             let setpoint = Setpoint {
                 position: [1e300, -gain, 1.0],
                 velocity: [gain, 0.0, 1.0],
             };
             for method in [Method::Euler, Method::Rk4] {
                 let limits = limits(&ControlLoop::new(arm, gains, setpoint).with_method(method));
-                for limit in [
-                    limits.held,
-                    limits.continuous,
-                    limits.minimum_held,
-                    limits.minimum_continuous,
-                ] {
+                let minima = [limits.minimum_held, limits.minimum_continuous];
+                for limit in minima.into_iter().chain([limits.held, limits.continuous]) {
                     assert!(limit.is_none_or(|limit| limit >= 0.0), "{limits:?}");
                 }
             }
@@ -368,11 +249,8 @@ fn check_braked(
     let inertia = mass_matrix(arm, &pose)[0][0];
     let ([l1, l2], [m1, m2]) = (*arm.lengths(), *arm.masses());
     let weight = arm.gravity() * ((0.5 * m1 + m2) * l1 + 0.5 * m2 * l2 * f64::cos(bend));
-    let gains = Gains {
-        kp: [100.0; 2],
-        ki: [part * kd[0] * (100.0 + weight) / inertia, elbow],
-        kd,
-    };
+    let ki = [part * kd[0] * (100.0 + weight) / inertia, elbow];
+    let gains = gains([100.0; 2], ki, kd);
     let control = ControlLoop::new(*arm, gains, Setpoint::at(pose)).with_method(method);
     let found = limits(&control);
     let told = format!("{part}: {found:?} {bend} {gains:?} {arm:?}");

@@ -5,7 +5,8 @@ use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::taylor::{ROUNDING, TaylorReference};
 use serde_json::Value;
 
-use crate::reference::{array, numbers, state, stored};
+use crate::reference::{motions, state};
+use crate::stored::{arm, array, for_links, list, number, start};
 
 fn size<const N: usize>(x: &[f64; N]) -> f64 {
     x.iter().map(|x| x.abs()).fold(0.0, f64::max)
@@ -16,21 +17,14 @@ fn difference<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
 }
 
 fn check_stored<const N: usize>(case: &Value) -> f64 {
-    let gravity = case["gravity"].as_f64().unwrap();
-    let lengths = array::<N>(&case["lengths"]);
-    let arm = Arm::new(lengths, array(&case["masses"]), gravity).unwrap();
-    let effort = array(&case["tau"]);
-    let mut follower = TaylorReference::new(State {
-        position: array(&case["q0"]),
-        velocity: array(&case["qdot0"]),
-    });
+    let (arm, effort) = (arm::<N>(case), array(&case["tau"]));
+    let mut follower = TaylorReference::new(start(case));
     let (mut before, mut worst) = (0.0, 0.0_f64);
-    for (index, time) in numbers(&case["times"]).into_iter().enumerate() {
+    for (index, time) in list(&case["times"]).into_iter().enumerate() {
         assert!(follower.follow(&arm, &effort, time - before));
         before = time;
-        let growth = case["growth_max"][index].as_f64().unwrap();
-        let (q, v) = (&case["q"][index], &case["qdot"][index]);
-        let (q, v) = (array::<N>(q), array::<N>(v));
+        let growth = number(&case["growth_max"][index]);
+        let [q, v] = ["q", "qdot"].map(|name| array::<N>(&case[name][index]));
         let state = follower.state();
         let off = difference(&state.position, &q).max(difference(&state.velocity, &v));
         worst = worst.max(off / (f64::EPSILON * growth * size(&q).max(size(&v)).max(1.0)));
@@ -42,13 +36,8 @@ fn check_stored<const N: usize>(case: &Value) -> f64 {
 /// 0.63 was seen.
 #[test]
 fn the_stored_motions_are_followed_to_rounding() {
-    let stored = stored();
-    for case in stored["cases"].as_array().unwrap() {
-        let worst = match case["n"].as_u64().unwrap() {
-            2 => check_stored::<2>(case),
-            _ => check_stored::<3>(case),
-        };
-        println!("{} {}: {worst:.2} ulp", case["name"], case["n"]);
+    for case in motions() {
+        let worst = for_links!(case, check_stored(&case));
         assert!(worst < 2.0, "{} {}: {worst}", case["name"], case["n"]);
     }
 }
@@ -56,24 +45,17 @@ fn the_stored_motions_are_followed_to_rounding() {
 /// A random arm, its state, an effort, and a time in which it moves far.
 fn any<const N: usize>(rng: &mut fastrand::Rng) -> (Arm<N>, State<N>, [f64; N], f64) {
     let mut size = || 10_f64.powf(rng.f64() - 0.5);
-    let (lengths, masses): ([f64; N], [f64; N]) = (
-        std::array::from_fn(|_| size()),
-        std::array::from_fn(|_| size()),
-    );
-    let shortest = lengths.iter().copied().fold(f64::INFINITY, f64::min);
-    let slow = shortest.sqrt();
+    let lengths: [f64; N] = std::array::from_fn(|_| size());
+    let masses: [f64; N] = std::array::from_fn(|_| size());
+    let slow = lengths.iter().copied().fold(f64::INFINITY, f64::min).sqrt();
     let mut around = |size: f64| size * (2.0 * rng.f64() - 1.0);
     let state = State {
         position: std::array::from_fn(|_| around(3.0)),
         velocity: std::array::from_fn(|_| around(2.0) / slow),
     };
     let effort = std::array::from_fn(|i| around(5.0) * masses[i] * lengths[i]);
-    (
-        Arm::new(lengths, masses, 9.81).unwrap(),
-        state,
-        effort,
-        slow,
-    )
+    let arm = Arm::new(lengths, masses, 9.81).unwrap();
+    (arm, state, effort, slow)
 }
 
 /// The largest growth of a change of each coordinate of the start.
@@ -135,9 +117,7 @@ fn check_tolerances<const N: usize>() -> f64 {
 #[test]
 fn an_asked_tolerance_is_kept() {
     for worst in [check_tolerances::<2>(), check_tolerances::<3>()] {
-        println!("{worst:.3} of the tolerance times way and growth");
-        assert!(worst < 1.0, "{worst}");
-        assert!(worst > 1e-3, "{worst}");
+        assert!((1e-3..1.0).contains(&worst), "{worst}");
     }
 }
 
@@ -178,11 +158,8 @@ fn hostile_arms_are_followed_as_exactly_as_they_can_be_known() {
                 velocity: std::array::from_fn(|_| 2.0 * rng.f64() - 1.0),
             };
             let [off, inherent] = beside_twice_the_digits(&arm, &start, 0.3 * shortest.sqrt());
-            println!("{tip:e} {lengths:?}: {off:.1e}, inherent {inherent:.1e}");
-            assert!(
-                off <= 100.0 * inherent.max(f64::EPSILON),
-                "{tip:e} {lengths:?}: {off:e}, inherent {inherent:e}"
-            );
+            let told = format!("{tip:e} {lengths:?}: {off:e}, inherent {inherent:e}");
+            assert!(off <= 100.0 * inherent.max(f64::EPSILON), "{told}");
         }
     }
 }

@@ -3,6 +3,8 @@
 //! With `phi_i = q_1 + ... + q_i` the Lagrangian gives, for every link `i`,
 //! `sum_j A_ij (cos(phi_i - phi_j) phi_j'' + sin(phi_i - phi_j) phi_j'^2) + b_i cos(phi_i) = tau_i - tau_(i+1)`.
 
+#![allow(clippy::indexing_slicing, reason = "every list of an arm has an entry for each link")]
+
 /// Masses, lengths and gravity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm {
@@ -26,13 +28,12 @@ pub struct State {
 /// Running sums: relative to absolute.
 #[must_use]
 pub fn absolute(relative: &[f64]) -> Vec<f64> {
-    relative
-        .iter()
-        .scan(0.0, |sum, value| {
-            *sum += value;
-            Some(*sum)
-        })
-        .collect()
+    let mut sum = 0.0;
+    let add = |value: &f64| {
+        sum += value;
+        sum
+    };
+    relative.iter().map(add).collect()
 }
 
 impl Arm {
@@ -42,26 +43,20 @@ impl Arm {
         Self { masses: vec![1.0; links], lengths: vec![1.0; links], gravity }
     }
 
-    /// The mass beyond link `i`.
-    fn beyond(&self, i: usize) -> f64 {
-        self.masses.iter().skip(i + 1).sum()
+    /// A part of the mass of link `i`, and all beyond it.
+    fn carried(&self, i: usize, part: f64) -> f64 {
+        part * self.masses[i] + self.masses[i + 1..].iter().sum::<f64>()
     }
 
     /// `A_ij`.
     fn inertia(&self, i: usize, j: usize) -> f64 {
-        let (near, far) = (i.min(j), i.max(j));
-        let own = if near == far { 1.0 / 3.0 } else { 0.5 };
-        self.at(&self.lengths, near) * self.at(&self.lengths, far) * (own * self.at(&self.masses, far) + self.beyond(far))
+        let part = if i == j { 1.0 / 3.0 } else { 0.5 };
+        self.lengths[i] * self.lengths[j] * self.carried(i.max(j), part)
     }
 
     /// `b_i`.
     fn weight(&self, i: usize) -> f64 {
-        self.gravity * self.at(&self.lengths, i) * (0.5 * self.at(&self.masses, i) + self.beyond(i))
-    }
-
-    #[allow(clippy::unused_self, reason = "one spelling for all of the arm's rows")]
-    fn at(&self, values: &[f64], i: usize) -> f64 {
-        values.get(i).copied().unwrap_or(f64::NAN)
+        self.gravity * self.lengths[i] * self.carried(i, 0.5)
     }
 
     /// The tip: `x`, `y` and its heading.
@@ -77,22 +72,15 @@ impl Arm {
     #[must_use]
     pub fn gravity_load(&self, position: &[f64]) -> Vec<f64> {
         let headings = absolute(position);
-        let mut load: Vec<f64> = headings.iter().enumerate().map(|(i, heading)| self.weight(i) * heading.cos()).collect();
-        let mut sum = 0.0;
-        for entry in load.iter_mut().rev() {
-            sum += *entry;
-            *entry = sum;
-        }
-        load
+        let weights: Vec<f64> = headings.iter().enumerate().map(|(i, heading)| self.weight(i) * heading.cos()).collect();
+        (0..weights.len()).map(|i| weights[i..].iter().sum()).collect()
     }
 
     /// Kinetic energy [J].
     #[must_use]
     pub fn kinetic(&self, state: &State) -> f64 {
-        let (headings, rates) = (absolute(&state.position), absolute(&state.velocity));
-        let pairs = headings.iter().zip(&rates).enumerate();
-        let row = |(i, (heading, rate)): (usize, (&f64, &f64))| 0.5 * rate * self.momentum_of(i, *heading, &headings, &rates);
-        pairs.map(row).sum()
+        let rates = absolute(&state.velocity);
+        rates.iter().zip(self.momenta(state)).map(|(rate, momentum)| 0.5 * rate * momentum).sum()
     }
 
     /// Potential energy, zero at `y = 0` [J].
@@ -104,40 +92,32 @@ impl Arm {
     /// Angular momentum about the base [kg m^2/s].
     #[must_use]
     pub fn momentum(&self, state: &State) -> f64 {
-        let (headings, rates) = (absolute(&state.position), absolute(&state.velocity));
-        headings.iter().enumerate().map(|(i, heading)| self.momentum_of(i, *heading, &headings, &rates)).sum()
+        self.momenta(state).iter().sum()
     }
 
-    fn momentum_of(&self, i: usize, heading: f64, headings: &[f64], rates: &[f64]) -> f64 {
-        let terms = headings.iter().zip(rates).enumerate();
-        terms.map(|(j, (other, rate))| self.inertia(i, j) * (heading - other).cos() * rate).sum()
+    /// Those of the links' rates.
+    fn momenta(&self, state: &State) -> Vec<f64> {
+        let (headings, rates) = (absolute(&state.position), absolute(&state.velocity));
+        let count = headings.len();
+        let term = |i: usize, j: usize| self.inertia(i, j) * (headings[i] - headings[j]).cos() * rates[j];
+        (0..count).map(|i| (0..count).map(|j| term(i, j)).sum()).collect()
     }
 
     /// Joint accelerations without effort.
     #[must_use]
     pub fn free_acceleration(&self, position: &[f64], velocity: &[f64]) -> Vec<f64> {
         let (headings, rates) = (absolute(position), absolute(velocity));
-        let mut rows = Vec::new();
-        for (i, heading) in headings.iter().enumerate() {
-            let mut row: Vec<f64> = headings.iter().enumerate().map(|(j, other)| self.inertia(i, j) * (heading - other).cos()).collect();
-            let turning: f64 = headings
-                .iter()
-                .zip(&rates)
-                .enumerate()
-                .map(|(j, (other, rate))| self.inertia(i, j) * (heading - other).sin() * rate * rate)
-                .sum();
-            row.push(-turning - self.weight(i) * heading.cos());
-            rows.push(row);
+        let count = headings.len();
+        let row = |i: usize| {
+            let turning = |j: usize| self.inertia(i, j) * (headings[i] - headings[j]).sin() * rates[j] * rates[j];
+            let right = -(0..count).map(turning).sum::<f64>() - self.weight(i) * headings[i].cos();
+            (0..count).map(|j| self.inertia(i, j) * (headings[i] - headings[j]).cos()).chain([right]).collect()
+        };
+        let mut relative = solved((0..count).map(row).collect());
+        for i in (1..count).rev() {
+            relative[i] -= relative[i - 1];
         }
-        let mut before = 0.0;
-        solved(rows)
-            .into_iter()
-            .map(|acceleration| {
-                let relative = acceleration - before;
-                before = acceleration;
-                relative
-            })
-            .collect()
+        relative
     }
 }
 
@@ -145,24 +125,13 @@ impl Arm {
 fn solved(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
     let count = rows.len();
     for pivot in 0..count {
-        let Some(above) = rows.get(pivot).cloned() else {
-            continue;
-        };
-        for row in rows.iter_mut().skip(pivot + 1) {
-            let factor = row.get(pivot).zip(above.get(pivot)).map_or(f64::NAN, |(below, above)| below / above);
+        let above = rows[pivot].clone();
+        for (_, row) in rows.iter_mut().enumerate().filter(|(at, _)| *at != pivot) {
+            let factor = row[pivot] / above[pivot];
             for (entry, over) in row.iter_mut().zip(&above) {
                 *entry -= factor * over;
             }
         }
     }
-    let mut solution = vec![0.0; count];
-    for at in (0..count).rev() {
-        let Some(row) = rows.get(at) else { continue };
-        let known: f64 = row.iter().take(count).zip(&solution).skip(at + 1).map(|(entry, value)| entry * value).sum();
-        let value = row.last().zip(row.get(at)).map_or(f64::NAN, |(right, pivot)| (right - known) / pivot);
-        if let Some(entry) = solution.get_mut(at) {
-            *entry = value;
-        }
-    }
-    solution
+    rows.iter().enumerate().map(|(at, row)| row[count] / row[at]).collect()
 }

@@ -13,7 +13,7 @@ use crate::Got;
 use crate::arm::{Arm, State};
 use crate::method::step;
 use crate::peer::{Answer, PATIENCE, Peer, Trouble, is_message};
-use crate::values::{boolean, largest, list, minus, must, near, number, numbers, numbers_of, text};
+use crate::values::{largest, list, minus, must, near, number, numbers, numbers_of, text};
 
 /// Standard gravity of the specification.
 pub const GRAVITY: f64 = 9.81;
@@ -23,21 +23,17 @@ pub const GRAVITY: f64 = 9.81;
 pub struct Found {
     /// How many links it has.
     pub links: usize,
-    /// `/arm_sim/set_params {}`.
-    pub params: Result<Value, String>,
-    /// `/arm_sim/set_integrator {}`.
-    pub integrator: Result<Value, String>,
-    /// `/arm_sim/pause {}`.
-    pub pause: Result<Value, String>,
-    /// `/pid_controller/enable {}`.
-    pub enable: Result<Value, String>,
-    /// `/pid_controller/set_gains {}`.
-    pub gains: Result<Value, String>,
+    /// The answers of the services in [`SETTINGS`] to `{}`.
+    settings: [Result<Value, String>; SETTINGS.len()],
     /// A message on `/joint_states`.
     pub state: Result<Joints, String>,
     /// Services of the preparation that give no answer at all; they are left out of it.
     pub silent: Vec<&'static str>,
 }
+
+/// Services that return settings, in the order in which these are restored.
+const SETTINGS: [&str; 5] =
+    ["/arm_sim/set_params", "/arm_sim/set_integrator", "/pid_controller/set_gains", "/pid_controller/enable", "/arm_sim/pause"];
 
 /// Services that end a trial and a goal.
 const ENDING: [&str; 2] = ["/ik_trial/stop", "/ik_action/cancel_goal"];
@@ -55,19 +51,17 @@ impl Found {
             Some(links) => return Err(format!("the server at {address} has {links} links; the specification has 2 or 3")),
             None => return Err(format!("the server at {address} tells no number of links: {}", params.err().unwrap_or_default())),
         };
-        let mut found = Self {
-            links,
-            params,
-            state,
-            integrator: bench.accepted("/arm_sim/set_integrator", &json!({})),
-            pause: bench.accepted("/arm_sim/pause", &json!({})),
-            enable: bench.accepted("/pid_controller/enable", &json!({})),
-            gains: bench.accepted("/pid_controller/set_gains", &json!({})),
-            silent: Vec::new(),
-        };
+        let settings = SETTINGS.map(|service| bench.accepted(service, &json!({})));
         // A rejection is an answer.
-        found.silent = ENDING.into_iter().filter(|service| bench.peer.call(service, &json!({})).is_err()).collect();
-        Ok(found)
+        let is_silent = |service: &&str| bench.peer.call(service, &json!({})).is_err();
+        let silent = ENDING.into_iter().filter(is_silent).collect();
+        Ok(Self { links, settings, state, silent })
+    }
+
+    /// The settings that a service returned.
+    pub fn setting(&self, service: &str) -> Result<Value, String> {
+        let found = SETTINGS.iter().zip(&self.settings).find(|(name, _)| **name == service);
+        found.map_or_else(|| Err(format!("{service} has not been asked")), |(_, values)| values.clone())
     }
 
     /// Restores the server's settings, as far as it accepts them.
@@ -75,14 +69,7 @@ impl Found {
         let Ok(mut bench) = Bench::prepared(address, self) else {
             return;
         };
-        let settings = [
-            ("/arm_sim/set_params", &self.params),
-            ("/arm_sim/set_integrator", &self.integrator),
-            ("/pid_controller/set_gains", &self.gains),
-            ("/pid_controller/enable", &self.enable),
-            ("/arm_sim/pause", &self.pause),
-        ];
-        for (service, values) in settings {
+        for (service, values) in SETTINGS.iter().zip(&self.settings) {
             if let Ok(values) = values {
                 // A server that refuses has failed its rule already.
                 let _ = bench.peer.call(service, values);
@@ -265,6 +252,15 @@ impl Bench {
         Ok(found)
     }
 
+    /// Passes if the arm stays at a pose for a time, without effort.
+    pub fn stays_at(&mut self, pose: &[f64], seconds: f64, tolerance: f64) -> Got {
+        for joints in self.joints_for(seconds)? {
+            near("effort", &joints.effort, &self.each(0.0), tolerance)?;
+            near("position", &joints.position, pose, tolerance)?;
+        }
+        Ok("no effort and no motion".to_owned())
+    }
+
     /// Joint states until the arm has been at rest for a while; the last ones.
     pub fn at_rest(&mut self) -> Result<Joints, String> {
         self.fresh()?;
@@ -400,11 +396,6 @@ impl Bench {
         let count = usize::try_from(steps).unwrap_or(usize::MAX).saturating_add(1);
         let read = |name| numbers_of(&values, name, count);
         Ok([read("times")?, read("positions")?, read("velocities")?])
-    }
-
-    /// Whether the controller is on.
-    pub fn is_enabled(&mut self) -> Result<bool, String> {
-        boolean(&self.accepted("/pid_controller/enable", &json!({}))?, "data")
     }
 
     /// Sends a goal; its id.

@@ -1,7 +1,7 @@
 //! The specification's own tests: black box, over TCP, against any server of the protocol.
 //!
-//! A rule is a sentence of the specification, the expected outcome, and a function that checks it. The files in
-//! `rules/` follow the sections of the specification. Reference values come from formulas in this crate (`arm.rs`,
+//! A rule is a sentence of the specification, the expected outcome, and a function that checks it. `rules/rules.txt` has
+//! the sentences, and the files in `rules/` have the functions. All follow the sections of the specification. Reference values come from formulas in this crate (`arm.rs`,
 //! `method.rs`), from closed forms and from conservation laws, never from a server.
 
 pub mod arm;
@@ -32,42 +32,24 @@ pub enum Category {
 impl Category {
     /// All of them, in the specification's order.
     pub const ALL: [Self; 4] = [Self::Integrators, Self::Pid, Self::Dynamics, Self::Kinematics];
-}
 
-impl fmt::Display for Category {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.pad(match self {
+    /// The name in the totals.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
             Self::Integrators => "Integrators",
             Self::Pid => "PID control",
             Self::Dynamics => "Dynamics and service contract",
             Self::Kinematics => "Inverse kinematics",
-        })
-    }
-}
-
-/// The arms that a rule is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Links {
-    /// 2 and 3 links.
-    Any,
-    /// 2 links alone.
-    Two,
-    /// 3 links alone.
-    Three,
-}
-
-impl Links {
-    fn include(self, links: usize) -> bool {
-        match self {
-            Self::Any => true,
-            Self::Two => links == 2,
-            Self::Three => links == 3,
         }
     }
 }
 
 /// The outcome of a check: a description of the answer, as a success or as a failure.
 pub type Got = Result<String, String>;
+
+/// The id of a rule, and the function that checks it.
+pub type Check = (&'static str, fn(&mut Bench) -> Got);
 
 /// A rule of the specification.
 #[derive(Debug, Clone, Copy)]
@@ -76,8 +58,8 @@ pub struct Rule {
     pub id: &'static str,
     /// The category that it counts for.
     pub category: Category,
-    /// The arms that it is for.
-    pub links: Links,
+    /// The number of links that it is for. `None`: any.
+    pub links: Option<usize>,
     /// The rule in plain words.
     pub says: &'static str,
     /// The expected outcome.
@@ -90,17 +72,8 @@ impl Rule {
     /// Whether the rule is for an arm with this many links.
     #[must_use]
     pub fn applies_to(&self, links: usize) -> bool {
-        self.links.include(links)
+        self.links.is_none_or(|one| one == links)
     }
-}
-
-/// The expected outcome of a request that must be rejected.
-pub const REJECTED: &str = "result false and a status";
-
-/// A rule for any arm. `rules::all` gives it the category of its file.
-#[must_use]
-pub const fn rule(id: &'static str, says: &'static str, expected: &'static str, check: fn(&mut Bench) -> Got) -> Rule {
-    Rule { id, category: Category::Integrators, links: Links::Any, says, expected, check }
 }
 
 /// The result of a rule.
@@ -151,7 +124,7 @@ impl Default for Selection {
 
 impl Selection {
     fn includes(&self, rule: &Rule) -> bool {
-        let name = rule.category.to_string().to_lowercase();
+        let name = rule.category.name().to_lowercase();
         self.category.as_ref().is_none_or(|part| name.contains(&part.to_lowercase()))
             && self.rule.as_ref().is_none_or(|start| rule.id == start || rule.id.starts_with(&format!("{start}-")))
     }
@@ -192,7 +165,7 @@ pub fn totals(rows: &[Row]) -> String {
         let here = rows.iter().filter(|row| row.rule.category == category);
         let (holding, all) = here.fold((0, 0), |(holding, all), row| (holding + usize::from(row.holds()), all + 1));
         // A `String` takes every line.
-        let _ = writeln!(text, "{category:<30} {holding:>3} of {all:>3}");
+        let _ = writeln!(text, "{:<30} {holding:>3} of {all:>3}", category.name());
     }
     let holding = rows.iter().filter(|row| row.holds()).count();
     let _ = write!(text, "{:<30} {holding:>3} of {:>3}", "All", rows.len());

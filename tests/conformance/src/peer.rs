@@ -4,18 +4,18 @@
 //! answer becomes an error that quotes it.
 
 use std::collections::VecDeque;
-use std::io::{ErrorKind, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::ToSocketAddrs;
 use std::time::{Duration, Instant};
 
+use pendularm_client::blocking::Client;
+use pendularm_client::codec::{Event, Framing};
+use pendularm_client::{Error, call, is_response_to};
 use serde_json::{Value, json};
 
 /// The longest wait for an answer to one call.
 pub const PATIENCE: Duration = Duration::from_secs(3);
 /// Frames kept for later reading; the oldest is dropped beyond it.
 const KEPT: usize = 4096;
-/// Bytes of one frame; a longer one is an error.
-const LONGEST: usize = 64 << 20;
 
 /// The reason for a missing frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,8 +42,7 @@ pub struct Answer {
 /// A connection.
 #[derive(Debug)]
 pub struct Peer {
-    stream: TcpStream,
-    unread: Vec<u8>,
+    client: Client,
     kept: VecDeque<Value>,
     calls: u64,
 }
@@ -53,12 +52,8 @@ impl Peer {
     pub fn connect(address: &str) -> Result<Self, String> {
         let mut last = format!("{address} is no address");
         for one in address.to_socket_addrs().map_err(|error| format!("{address}: {error}"))? {
-            match TcpStream::connect_timeout(&one, PATIENCE) {
-                Ok(stream) => {
-                    let set = stream.set_nodelay(true).and_then(|()| stream.set_write_timeout(Some(PATIENCE)));
-                    set.map_err(|error| format!("{address}: {error}"))?;
-                    return Ok(Self { stream, unread: Vec::new(), kept: VecDeque::new(), calls: 0 });
-                }
+            match Client::connect(Framing::Lines, one, PATIENCE) {
+                Ok(client) => return Ok(Self { client, kept: VecDeque::new(), calls: 0 }),
                 Err(error) => last = format!("no connection to {address}: {error}"),
             }
         }
@@ -67,7 +62,8 @@ impl Peer {
 
     /// The server's address.
     pub fn address(&self) -> Result<String, String> {
-        self.stream.peer_addr().map(|address| address.to_string()).map_err(|error| format!("the connection has ended: {error}"))
+        let address = self.client.stream().peer_addr();
+        address.map(|address| address.to_string()).map_err(|error| format!("the connection has ended: {error}"))
     }
 
     /// Sends one frame and a newline.
@@ -77,17 +73,17 @@ impl Peer {
 
     /// Sends one line as it is.
     pub fn send_line(&mut self, line: &str) -> Result<(), String> {
-        self.stream.write_all(format!("{line}\n").as_bytes()).map_err(|error| format!("the server closed the connection: {error}"))
+        self.client.write(format!("{line}\n").as_bytes()).map_err(|error| format!("the server closed the connection: {error}"))
     }
 
     /// Calls a service and returns its answer; other frames are kept.
     pub fn call(&mut self, service: &str, args: &Value) -> Result<Answer, String> {
-        let id = self.ask(service, args)?;
+        self.calls += 1;
+        let id = json!(format!("call-{}", self.calls));
+        self.send(&call(service, args, &id))?;
         let until = Instant::now() + PATIENCE;
-        let frame = self.find(until, |frame| is_answer(frame, &id)).map_err(|trouble| match trouble {
-            Trouble::Silence => {
-                format!("{service} gave no answer within {} s", PATIENCE.as_secs())
-            }
+        let frame = self.find(until, |frame| is_response_to(frame, &id)).map_err(|trouble| match trouble {
+            Trouble::Silence => format!("{service} gave no answer within {} s", PATIENCE.as_secs()),
             Trouble::Broken(why) => why,
         })?;
         Ok(Answer {
@@ -96,14 +92,6 @@ impl Peer {
             status: frame.get("status").and_then(Value::as_str).unwrap_or_default().to_owned(),
             frame,
         })
-    }
-
-    /// Sends a call without waiting for its answer; returns its id.
-    pub fn ask(&mut self, service: &str, args: &Value) -> Result<String, String> {
-        self.calls += 1;
-        let id = format!("call-{}", self.calls);
-        self.send(&json!({"op": "call_service", "id": id, "service": service, "args": args}))?;
-        Ok(id)
     }
 
     /// The first frame, kept or new, for which `is_it` is true. It is removed, and others are kept.
@@ -129,42 +117,18 @@ impl Peer {
     }
 
     fn receive(&mut self, until: Instant) -> Result<Value, Trouble> {
-        let mut chunk = [0; 1 << 16];
         loop {
-            if let Some(end) = self.unread.iter().position(|byte| *byte == b'\n') {
-                let line: Vec<u8> = self.unread.drain(..=end).collect();
-                let text = String::from_utf8_lossy(&line);
-                if text.trim().is_empty() {
-                    continue;
+            match self.client.next_event(until) {
+                Ok(Event::Text(line)) if line.trim().is_empty() => {}
+                Ok(Event::Text(line)) => {
+                    return parse(&line).ok_or_else(|| Trouble::Broken(format!("a line is no JSON object: {}", beginning(&line))));
                 }
-                return parse(text.trim()).ok_or_else(|| Trouble::Broken(format!("a line is no JSON object: {}", beginning(&text))));
-            }
-            if self.unread.len() > LONGEST {
-                return Err(Trouble::Broken(format!("a frame is longer than {LONGEST} bytes")));
-            }
-            let left = until.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return Err(Trouble::Silence);
-            }
-            let read = self.stream.set_read_timeout(Some(left)).and_then(|()| self.stream.read(&mut chunk));
-            match read {
-                Ok(0) => {
-                    return Err(Trouble::Broken("the server closed the connection".to_owned()));
-                }
-                Ok(count) => self.unread.extend(chunk.iter().take(count)),
-                Err(error) if [ErrorKind::WouldBlock, ErrorKind::TimedOut, ErrorKind::Interrupted].contains(&error.kind()) => {}
-                Err(error) => {
-                    return Err(Trouble::Broken(format!("the server closed the connection: {error}")));
-                }
+                Err(Error::Late) => return Err(Trouble::Silence),
+                Err(error) => return Err(Trouble::Broken(format!("the server closed the connection: {error}"))),
+                Ok(event) => return Err(Trouble::Broken(format!("{event:?} instead of a line"))),
             }
         }
     }
-}
-
-/// Whether a frame answers the call with this id.
-#[must_use]
-pub fn is_answer(frame: &Value, id: &str) -> bool {
-    frame.get("op").and_then(Value::as_str) == Some("service_response") && frame.get("id").and_then(Value::as_str) == Some(id)
 }
 
 /// Whether a frame is a message on this topic.
@@ -186,18 +150,9 @@ fn parse(text: &str) -> Option<Value> {
 }
 
 fn without_non_finite(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for (at, piece) in text.split('"').enumerate() {
-        if at > 0 {
-            out.push('"');
-        }
-        // Every second piece is inside a string, except at escaped quotes, which are never next to a number in this
-        // protocol.
-        if at % 2 == 0 {
-            out.push_str(&piece.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null"));
-        } else {
-            out.push_str(piece);
-        }
-    }
-    out
+    // Every second piece is inside a string, except at escaped quotes, which are never next to a number in this protocol.
+    let number = |piece: &str| piece.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");
+    let pieces = text.split('"').enumerate();
+    let pieces: Vec<String> = pieces.map(|(at, piece)| if at % 2 == 0 { number(piece) } else { piece.to_owned() }).collect();
+    pieces.join("\"")
 }

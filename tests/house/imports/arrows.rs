@@ -1,34 +1,15 @@
 //! Arrows between the files of a package: an import is followed to the file that defines its name.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
 
 use super::files::{File, Module, child, read};
+use crate::tree::root;
 
-/// A package whose imports are looked at.
-pub(super) struct Package {
-    /// Its folder, from this one.
-    folder: &'static str,
-    /// Its name in paths.
-    name: &'static str,
-    /// It has more files than this.
-    more_than: usize,
-}
+/// A package whose imports are looked at: its folder, its name in paths, and it has more files than this.
+pub(super) type Package = (&'static str, &'static str, usize);
 
-pub(super) const PENDULARM: Package = Package {
-    folder: "",
-    name: "pendularm",
-    more_than: 100,
-};
-
-pub(super) const PACKAGES: [Package; 2] = [
-    PENDULARM,
-    Package {
-        folder: "ros2",
-        name: "pendularm_ros2",
-        more_than: 20,
-    },
-];
+pub(super) const PENDULARM: Package = ("", "pendularm", 100);
+pub(super) const PACKAGES: [Package; 2] = [PENDULARM, ("ros2", "pendularm_ros2", 20)];
 
 /// Arrows between files, with the names that make them.
 pub(super) type Arrows = BTreeMap<(String, String), BTreeSet<String>>;
@@ -41,28 +22,18 @@ fn parent(module: &Module) -> Option<Module> {
     Some(module[..module.len().checked_sub(1)?].to_vec())
 }
 
-impl Package {
-    fn source(&self) -> PathBuf {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        root.join(self.folder).join("src")
-    }
-}
-
 pub(super) struct SourceTree {
     name: &'static str,
     pub(super) modules: BTreeMap<Module, File>,
 }
 
 impl SourceTree {
-    pub(super) fn read(package: &Package) -> Self {
+    pub(super) fn read((folder, name, more_than): Package) -> Self {
         let mut modules = BTreeMap::new();
-        let source = package.source();
+        let source = root().join(folder).join("src");
         read(&source, &source, &Vec::new(), &mut modules);
-        assert!(modules.len() > package.more_than, "{}", modules.len());
-        Self {
-            name: package.name,
-            modules,
-        }
+        assert!(modules.len() > more_than, "{}", modules.len());
+        Self { name, modules }
     }
 
     /// The meaning of `path` in the file of `from`: a module of the crate, and the item in it if the path names one.
@@ -75,12 +46,10 @@ impl SourceTree {
             "self" => self.walk(from.clone(), behind, seen),
             "super" => self.walk(parent(from)?, behind, seen),
             name => {
-                let known = self.modules.contains_key(&child(from, name))
-                    || self.modules[from]
-                        .imports
-                        .iter()
-                        .any(|import| import.name == name);
-                known.then(|| self.walk(from.clone(), path, seen))?
+                let mut imports = self.modules[from].imports.iter();
+                let is_imported = imports.any(|import| import.name == name);
+                let is_known = is_imported || self.modules.contains_key(&child(from, name));
+                is_known.then(|| self.walk(from.clone(), path, seen))?
             }
         }
     }
@@ -117,10 +86,8 @@ impl SourceTree {
         for (module, file) in &self.modules {
             let used = |name: &str| file.paths.iter().any(|path| path[0] == name);
             let imports = file.imports.iter();
-            let imported = imports
-                .filter(|import| !import.handed_on || used(&import.name))
-                .map(|import| &import.path);
-            for path in imported.chain(&file.paths) {
+            let imported = imports.filter(|import| !import.handed_on || used(&import.name));
+            for path in imported.map(|import| &import.path).chain(&file.paths) {
                 // A module alone is no arrow. An item of it is one.
                 if let Some((target, Some(name))) = self.place(module, path, &mut Seen::new())
                     && target != *module

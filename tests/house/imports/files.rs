@@ -36,7 +36,6 @@ pub(super) fn read(source: &Path, folder: &Path, at: &Module, found: &mut BTreeM
         let below = child(at, &stem);
         if path.is_dir() {
             read(source, &path, &below, found);
-            continue;
         }
         if path.extension().is_none_or(|extension| extension != "rs") {
             continue;
@@ -112,15 +111,15 @@ fn scan(tokens: TokenStream, file: &mut File) {
     }
 }
 
+/// Whether `pub` or `pub(scope)` is before a `use`.
 fn is_handed_on(before: &[TokenTree]) -> bool {
-    let last = before.len().checked_sub(1);
-    let before_scope = match last.map(|last| &before[last]) {
-        Some(TokenTree::Group(scope)) if scope.delimiter() == Delimiter::Parenthesis => {
-            last.and_then(|last| last.checked_sub(1))
+    let before = match before {
+        [before @ .., TokenTree::Group(scope)] if scope.delimiter() == Delimiter::Parenthesis => {
+            before
         }
-        _ => last,
+        _ => before,
     };
-    ident(before_scope.map(|at| &before[at])).is_some_and(|word| word == "pub")
+    ident(before.last()).is_some_and(|word| word == "pub")
 }
 
 /// The imports of one `use`, whose braces nest.

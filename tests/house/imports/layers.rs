@@ -62,23 +62,19 @@ const PROTOCOL: [(&str, &[&str]); 8] = [
 /// Compares the arrows between the subfolders of `folder` with its table of layers.
 fn every_folder_imports_only_allowed_folders(folder: &str, layers: &[(&str, &[&str])]) {
     for (row, (layer, may)) in layers.iter().enumerate() {
-        let is_above = |name: &&&str| layers[..row].iter().any(|(above, _)| *above == **name);
-        assert_eq!(
-            may.iter().filter(is_above).count(),
-            may.len(),
-            "{layer} may import only layers with a row above its own"
-        );
+        let is_above = |name: &&str| layers[..row].iter().any(|(above, _)| above == name);
+        let told = format!("{layer} may import only layers with a row above its own");
+        assert!(may.iter().all(is_above), "{told}");
     }
     let folder = |path: &str| {
         let path = path.strip_prefix(folder)?;
         let folder = path.split(['/', '.']).next()?;
         (folder != "mod").then(|| folder.to_owned())
     };
-    let tree = SourceTree::read(&PENDULARM);
-    let files = tree.modules.values();
-    let mut found: BTreeMap<String, BTreeSet<String>> = files
-        .filter_map(|file| Some((folder(&file.path)?, BTreeSet::new())))
-        .collect();
+    let tree = SourceTree::read(PENDULARM);
+    let folders = tree.modules.values().filter_map(|file| folder(&file.path));
+    let mut found: BTreeMap<String, BTreeSet<String>> =
+        folders.map(|folder| (folder, BTreeSet::new())).collect();
     for (from, to) in tree.arrows().keys() {
         if let (Some(from), Some(to)) = (folder(from), folder(to))
             && from != to
@@ -87,10 +83,10 @@ fn every_folder_imports_only_allowed_folders(folder: &str, layers: &[(&str, &[&s
         }
     }
     let owned = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
-    let allowed: BTreeMap<String, BTreeSet<String>> = layers
+    let allowed = layers
         .iter()
-        .map(|(layer, may)| ((*layer).to_owned(), owned(may)))
-        .collect();
+        .map(|(layer, may)| ((*layer).to_owned(), owned(may)));
+    let allowed: BTreeMap<String, BTreeSet<String>> = allowed.collect();
     assert_eq!(found, allowed, "left: the source; right: the table");
 }
 

@@ -1,28 +1,20 @@
 //! ARCHITECTURE.md and the glossary: the modules, paths, functions and types that they name exist.
 
 use std::collections::BTreeSet;
+use std::fs;
+use std::path::PathBuf;
 
 use super::codes;
 use crate::papers::{table, text};
-use crate::tree::rust_files;
+use crate::tree::{module_file, root, rust_files};
 
 /// The file of a module, or of the module that an item is in, and the item's name.
-fn place_of(path: &str) -> Option<(String, Option<String>)> {
-    let mut module = path.replace("::", "/");
-    let mut item = None;
-    loop {
-        let files = [format!("src/{module}.rs"), format!("src/{module}/mod.rs")];
-        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-        if let Some(file) = files.into_iter().find(|file| root.join(file).exists()) {
-            return Some((file, item));
-        }
-        let (before, last) = module.rsplit_once('/')?;
-        if item.is_some() {
-            return None;
-        }
-        item = Some(last.to_owned());
-        module = before.to_owned();
-    }
+fn place_of(path: &str) -> Option<(String, Option<&str>)> {
+    let whole = module_file(path).map(|file| (file, None));
+    whole.or_else(|| {
+        let (module, item) = path.rsplit_once("::")?;
+        Some((module_file(module)?, Some(item)))
+    })
 }
 
 #[test]
@@ -30,22 +22,19 @@ fn every_word_of_the_glossary_is_the_name_of_its_item() {
     let rows = table(&text("docs/glossary.md"), "word | means");
     assert!(rows.len() > 25, "{} words", rows.len());
     for row in rows {
-        for path in codes(&row[2])
-            .into_iter()
-            .filter(|path| path.contains("::"))
-        {
-            let (file, item) = place_of(path).unwrap_or_else(|| panic!("{path}: no such module"));
-            if let Some(item) = item {
-                let source = text(&file);
-                let is_public = |kind: &&str| {
-                    let name = format!(" {kind} {item}");
-                    let mut lines = source.lines().map(str::trim_start);
-                    lines.any(|line| line.starts_with("pub") && line.contains(&name))
-                };
-                let kinds = ["struct", "enum", "const", "fn", "trait"];
-                let is_there = kinds.iter().any(is_public);
-                assert!(is_there, "{file} has no {item}");
-            }
+        let paths = codes(&row[2]).into_iter();
+        for path in paths.filter(|path| path.contains("::")) {
+            let place = place_of(path);
+            let (file, item) = place.unwrap_or_else(|| panic!("{path}: no such module"));
+            let Some(item) = item else { continue };
+            let source = text(&file);
+            let is_public = |kind: &str| {
+                let name = format!(" {kind} {item}");
+                let mut lines = source.lines().map(str::trim_start);
+                lines.any(|line| line.starts_with("pub") && line.contains(&name))
+            };
+            let kinds = ["struct", "enum", "const", "fn", "trait"];
+            assert!(kinds.into_iter().any(is_public), "{file} has no {item}");
         }
     }
 }
@@ -56,14 +45,12 @@ fn every_path_that_the_architecture_names_exists() {
     let folders = [
         "src/", "tests/", "docs/", "benches/", "scripts/", "page/", "fuzz/", "client/",
     ];
-    let named: BTreeSet<&str> = codes(&paper)
-        .into_iter()
-        .filter(|code| folders.iter().any(|folder| code.starts_with(folder)) && !code.contains('*'))
-        .collect();
+    let is_path = |code: &str| folders.iter().any(|folder| code.starts_with(folder));
+    let mut named = codes(&paper);
+    named.retain(|code| is_path(code) && !code.contains('*'));
     assert!(named.len() > 20, "{} paths", named.len());
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     for path in named {
-        assert!(root.join(path).exists(), "ARCHITECTURE.md names {path}");
+        assert!(root().join(path).exists(), "ARCHITECTURE.md names {path}");
     }
 }
 
@@ -80,36 +67,23 @@ fn every_function_on_the_way_of_a_frame_exists() {
         .filter_map(|word| word.trim_end_matches(':').rsplit_once("::"))
         .collect();
     assert!(named.len() > 15, "{named:?}");
-    let sources = rust_files("src");
+    let read = |path: PathBuf| (fs::read_to_string(&path).unwrap(), path);
+    let sources: Vec<(String, PathBuf)> = rust_files("src").into_iter().map(read).collect();
     for (owner, function) in named {
-        let is_type = owner.starts_with(char::is_uppercase);
-        let is_there = sources.iter().any(|path| {
-            let source = std::fs::read_to_string(path).unwrap();
-            let folder = path.to_str().unwrap();
-            let is_owner = if is_type {
-                source.contains(&format!("impl {owner} {{"))
-                    || source.contains(&format!("trait {owner} {{"))
+        let is_there = sources.iter().any(|(source, path)| {
+            let has = |kind: &str| source.contains(&format!("{kind} {owner} {{"));
+            let is_owner = if owner.starts_with(char::is_uppercase) {
+                has("impl") || has("trait")
             } else {
-                folder.ends_with(&format!("/{owner}.rs"))
-                    || folder.ends_with(&format!("/{owner}/mod.rs"))
+                path.ends_with(format!("{owner}.rs")) || path.ends_with(format!("{owner}/mod.rs"))
             };
-            let is_defined = ["(", "<"]
-                .iter()
-                .any(|next| source.contains(&format!("fn {function}{next}")));
-            is_owner && is_defined
+            let is_defined = |next: &str| source.contains(&format!("fn {function}{next}"));
+            // A function may be passed on by its module.
+            let is_passed_on = |line: &str| line.starts_with("pub use") && line.contains(function);
+            let is_named = ["(", "<"].into_iter().any(is_defined);
+            is_owner && (is_named || source.lines().any(is_passed_on))
         });
-        // A function may be passed on by its module.
-        let is_passed_on = !is_type
-            && sources.iter().any(|path| {
-                path.to_str()
-                    .unwrap()
-                    .ends_with(&format!("/{owner}/mod.rs"))
-                    && std::fs::read_to_string(path)
-                        .unwrap()
-                        .lines()
-                        .any(|line| line.starts_with("pub use") && line.contains(function))
-            });
-        assert!(is_there || is_passed_on, "{owner}::{function}");
+        assert!(is_there, "{owner}::{function}");
     }
 }
 
@@ -123,17 +97,21 @@ fn walk(header: &str) -> (usize, usize) {
         lines += source.lines().count();
         let names = codes(&row[1]);
         assert!(!names.is_empty(), "{path}: no name");
-        for name in names {
-            let is_defined = ["fn", "struct", "enum", "trait"].iter().any(|kind| {
-                ["(", "<", " ", ":"]
-                    .iter()
-                    .any(|next| source.contains(&format!("{kind} {name}{next}")))
+        let kinds = ["fn", "struct", "enum", "trait"];
+        let is_start = |before: &str| {
+            kinds
+                .iter()
+                .any(|kind| before.ends_with(&format!("{kind} ")))
+        };
+        for (place, name) in names.into_iter().enumerate() {
+            let mut found = source.match_indices(name).peekable();
+            let is_named = found.peek().is_some();
+            let is_defined = found.any(|(at, _)| {
+                let after = &source[at + name.len()..];
+                is_start(&source[..at]) && after.starts_with(['(', '<', ' ', ':'])
             });
-            let is_named = source.contains(name);
-            assert!(
-                is_defined || (name != codes(&row[1])[0] && is_named),
-                "{path}: no {name}"
-            );
+            // The first one is defined there.
+            assert!(is_defined || (place > 0 && is_named), "{path}: no {name}");
         }
     }
     let paths: BTreeSet<&str> = rows.iter().map(|row| codes(&row[0])[0]).collect();
@@ -144,16 +122,14 @@ fn walk(header: &str) -> (usize, usize) {
 /// The bounds are the present lengths, so a longer walk fails the test.
 #[test]
 fn the_walks_name_existing_files_and_become_no_longer() {
-    let (files, lines) = walk("a message passes");
-    assert!(
-        files <= 17 && lines <= 6_070,
-        "a message passes {files} files, {lines} lines"
-    );
-    let (files, lines) = walk("a call passes");
-    assert!(
-        files <= 21 && lines <= 7_407,
-        "a call passes {files} files, {lines} lines"
-    );
+    for (header, most_files, most_lines) in [
+        ("a message passes", 17, 6_070),
+        ("a call passes", 21, 7_407),
+    ] {
+        let (files, lines) = walk(header);
+        let is_short = files <= most_files && lines <= most_lines;
+        assert!(is_short, "{header} {files} files, {lines} lines");
+    }
 }
 
 /// In the drawings: paths by their slash, actors and messages by their capitals.
@@ -162,11 +138,8 @@ fn every_name_in_the_architectures_drawings_exists() {
     let paper = text("ARCHITECTURE.md");
     let drawings: Vec<&str> = paper.split("```mermaid\n").skip(1).collect();
     assert!(drawings.len() >= 2);
-    let sources: String = rust_files("src")
-        .iter()
-        .map(|path| std::fs::read_to_string(path).unwrap())
-        .collect();
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let sources = rust_files("src").into_iter().map(fs::read_to_string);
+    let sources: String = sources.map(Result::unwrap).collect();
     let mut named = 0;
     for drawing in drawings {
         let drawing = drawing.split("```").next().unwrap().replace("<br/>", " ");
@@ -174,16 +147,12 @@ fn every_name_in_the_architectures_drawings_exists() {
         let labels = drawing.split('"').skip(1).step_by(2);
         for word in labels.flat_map(|label| label.split([' ', ','])) {
             if word.contains('/') {
-                assert!(root.join(word).exists(), "ARCHITECTURE.md draws {word}");
+                assert!(root().join(word).exists(), "ARCHITECTURE.md draws {word}");
             } else if word.starts_with(char::is_uppercase) && word.contains(char::is_lowercase) {
                 // `WebSocket` is the name of the protocol, not of a type.
-                let is_ours = ["struct", "enum"]
-                    .iter()
-                    .any(|kind| sources.contains(&format!("{kind} {word}")));
-                assert!(
-                    is_ours || word == "WebSocket",
-                    "ARCHITECTURE.md draws {word}"
-                );
+                let is_type = |kind: &str| sources.contains(&format!("{kind} {word}"));
+                let is_known = is_type("struct") || is_type("enum") || word == "WebSocket";
+                assert!(is_known, "ARCHITECTURE.md draws {word}");
             } else {
                 continue;
             }

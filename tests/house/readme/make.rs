@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::path::PathBuf;
 use std::process::Command;
 
 use super::{codes, printed};
@@ -10,27 +11,25 @@ use crate::folder::Folder;
 use crate::papers::{table, text};
 use crate::tree::{files_in, root, rust_files};
 
+/// The targets with their help, and the prerequisites before it.
+fn rules(makefile: &str) -> impl Iterator<Item = (&str, &str)> {
+    let is_rule = |line: &&str| line.contains("## ") && !line.starts_with(['\t', '#']);
+    let lines = makefile.lines().filter(is_rule);
+    lines.filter_map(|line| line.split_once(':'))
+}
+
 #[test]
 fn the_papers_list_the_targets_that_make_help_lists() {
     let makefile = text("Makefile");
-    let documented: BTreeSet<String> = makefile
-        .lines()
-        .filter(|line| line.contains(":") && line.contains("## ") && !line.starts_with(['\t', '#']))
-        .filter_map(|line| line.split_once(':'))
-        .map(|(target, _)| format!("make {target}"))
-        .collect();
-    let phony = makefile
-        .lines()
-        .find_map(|line| line.strip_prefix(".PHONY: "))
-        .unwrap();
-    let phony: BTreeSet<String> = phony
-        .split(' ')
-        .map(|target| format!("make {target}"))
-        .collect();
+    let documented: BTreeSet<&str> = rules(&makefile).map(|(target, _)| target).collect();
+    let mut lines = makefile.lines();
+    let phony = lines.find_map(|line| line.strip_prefix(".PHONY: "));
+    let phony: BTreeSet<&str> = phony.unwrap().split(' ').collect();
     assert_eq!(documented, phony, "a target without help, or not phony");
-    let readme: BTreeSet<String> = table(&text("docs/development.md"), "target")
-        .iter()
-        .map(|row| codes(&row[0])[0].to_owned())
+    let rows = table(&text("docs/development.md"), "target");
+    let readme = rows.iter().map(|row| codes(&row[0])[0]);
+    let readme: BTreeSet<&str> = readme
+        .filter_map(|code| code.strip_prefix("make "))
         .collect();
     assert_eq!(readme, documented);
 }
@@ -47,22 +46,12 @@ fn every_filter_of_a_test_in_the_documents_names_a_module() {
             };
             let (program, named) = command.split_once(" -- ").unwrap_or((command, ""));
             let folder = format!("tests/{program}");
-            let modules: Vec<String> = rust_files(&folder)
-                .iter()
-                .map(|file| {
-                    file.strip_prefix(root().join(&folder))
-                        .unwrap()
-                        .with_extension("")
-                })
-                .map(|module| {
-                    module
-                        .to_str()
-                        .unwrap()
-                        .replace("/mod", "")
-                        .replace('/', "::")
-                        + "::"
-                })
-                .collect();
+            let module = |file: &PathBuf| {
+                let file = file.strip_prefix(root().join(&folder)).unwrap();
+                let module = file.with_extension("").to_str().unwrap().to_owned();
+                module.replace("/mod", "").replace('/', "::") + "::"
+            };
+            let modules: Vec<String> = rust_files(&folder).iter().map(module).collect();
             for filter in named.split(' ').filter(|filter| filter.ends_with("::")) {
                 filters += 1;
                 let is_there = modules.iter().any(|module| module.contains(filter));
@@ -77,11 +66,7 @@ fn every_filter_of_a_test_in_the_documents_names_a_module() {
 #[test]
 fn ci_runs_every_target() {
     let makefile = text("Makefile");
-    let script: String = text(".ci/run")
-        .lines()
-        .filter(|line| !line.trim_start().starts_with('#'))
-        .flat_map(|line| [line, "\n"])
-        .collect();
+    let script = text(".ci/run");
     let words = |part: &str| -> BTreeSet<String> {
         let split = part.split(|c: char| !(c.is_alphanumeric() || "_-".contains(c)));
         split.map(str::to_owned).collect()
@@ -90,7 +75,8 @@ fn ci_runs_every_target() {
     let mut bodies = std::collections::BTreeMap::new();
     let mut reached = String::new();
     let mut open: Option<&str> = None;
-    for line in script.lines() {
+    let is_code = |line: &&str| !line.trim_start().starts_with('#');
+    for line in script.lines().filter(is_code) {
         if let Some(name) = line.strip_suffix("() {") {
             open = Some(name);
         } else if line == "}" {
@@ -120,11 +106,7 @@ fn ci_runs_every_target() {
         }
     }
     // Prerequisites are run with their target.
-    let rules: Vec<(&str, &str)> = makefile
-        .lines()
-        .filter(|line| line.contains("## ") && !line.starts_with(['\t', '#']))
-        .filter_map(|line| line.split_once(": "))
-        .collect();
+    let rules: Vec<(&str, &str)> = rules(&makefile).collect();
     for _ in &rules {
         for (target, rule) in &rules {
             if run.contains(target) {
@@ -133,33 +115,26 @@ fn ci_runs_every_target() {
             }
         }
     }
-    let forgotten: Vec<&str> = rules
-        .iter()
-        .map(|(target, _)| *target)
-        .filter(|target| !run.contains(target))
-        .collect();
+    let mut forgotten: Vec<&str> = rules.iter().map(|(target, _)| *target).collect();
+    forgotten.retain(|target| !run.contains(target));
     assert!(rules.len() > 30 && forgotten.is_empty(), "{forgotten:?}");
+}
+
+/// Under `make test` the outer make passes its own flags.
+fn make(arguments: &[&str]) -> Command {
+    let mut command = Command::new("make");
+    command.args(arguments).current_dir(root());
+    command.env_remove("MAKEFLAGS").env_remove("MAKELEVEL");
+    command
 }
 
 #[test]
 fn make_alone_shows_the_help() {
-    let make = |arguments: &[&str]| {
-        // Under `make test` the outer make passes its own flags.
-        let mut command = Command::new("make");
-        printed(
-            command
-                .args(arguments)
-                .env_remove("MAKEFLAGS")
-                .env_remove("MAKELEVEL"),
-        )
-    };
-    let help = make(&[]);
-    assert_eq!(help, make(&["help"]));
+    let help = printed(&mut make(&[]));
+    assert_eq!(help, printed(&mut make(&["help"])));
     for row in table(&text("docs/development.md"), "target") {
-        assert!(
-            help.contains(codes(&row[0])[0]),
-            "{row:?} is not in\n{help}"
-        );
+        let target = codes(&row[0])[0];
+        assert!(help.contains(target), "{target} is not in\n{help}");
     }
 }
 
@@ -171,31 +146,18 @@ fn make_run_runs_a_program_that_is_there_where_there_is_no_cargo() {
     let target = Folder::new("make-run");
     fs::create_dir(target.join("release")).unwrap();
     let run = || {
-        Command::new("make")
-            .args(["run", "CARGO=/nowhere/cargo", "ARGS=--version"])
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .env("CARGO_TARGET_DIR", &*target)
-            .env_remove("MAKEFLAGS")
-            .env_remove("MAKELEVEL")
-            .output()
-            .unwrap()
+        let mut command = make(&["run", "CARGO=/nowhere/cargo", "ARGS=--version"]);
+        command.env("CARGO_TARGET_DIR", &*target).output().unwrap()
     };
     let without = run();
     assert!(!without.status.success());
     let why = String::from_utf8_lossy(&without.stderr);
-    assert!(
-        why.contains("needs cargo, or a program that is built already"),
-        "{why}"
-    );
-    symlink(
-        env!("CARGO_BIN_EXE_pendularm"),
-        target.join("release/pendularm"),
-    )
-    .unwrap();
+    let needs = "needs cargo, or a program that is built already";
+    assert!(why.contains(needs), "{why}");
+    let program = target.join("release/pendularm");
+    symlink(env!("CARGO_BIN_EXE_pendularm"), program).unwrap();
     let with = run();
     let said = String::from_utf8_lossy(&with.stdout);
-    assert!(
-        with.status.success() && said.contains("\npendularm "),
-        "{said}"
-    );
+    let runs = with.status.success() && said.contains("\npendularm ");
+    assert!(runs, "{said}");
 }

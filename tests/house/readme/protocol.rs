@@ -20,10 +20,8 @@ fn the_papers_list_every_topic_with_its_type_and_owner() {
         assert_eq!(codes(&row[1]), [topic.type_name()], "{}", topic.name());
         let (name, is_ours) = (topic.name(), topic.direction() == Direction::Published);
         assert_eq!(row[2].starts_with("any client"), !is_ours, "{name}");
-        assert!(
-            !is_ours || codes(&row[2]) == [topic.owner().name()],
-            "{name}"
-        );
+        let is_owner = codes(&row[2]) == [topic.owner().name()];
+        assert!(!is_ours || is_owner, "{name}");
     }
 }
 
@@ -63,15 +61,11 @@ fn the_papers_list_every_service_with_its_fields_in_order() {
     assert_eq!(listed, served);
     for row in &rows {
         let service = Service::from_name(codes(&row[0])[0]).unwrap();
-        let expected: Vec<(&str, bool)> = service
-            .fields()
-            .iter()
-            .map(|field| (field.name, field.required))
-            .collect();
-        let written: Vec<(&str, bool)> = codes(&row[1])
-            .into_iter()
-            .map(|name| (name, !row[1].contains(&format!("*`{name}`*"))))
-            .collect();
+        let fields = service.fields().iter();
+        let expected: Vec<_> = fields.map(|field| (field.name, field.required)).collect();
+        let is_required = |name: &str| !row[1].contains(&format!("*`{name}`*"));
+        let names = codes(&row[1]).into_iter();
+        let written: Vec<_> = names.map(|name| (name, is_required(name))).collect();
         assert_eq!(written, expected, "{}", service.name());
         // Explanations follow a colon.
         let said = row[2].split(':').next().unwrap();
@@ -85,10 +79,9 @@ fn the_papers_list_every_service_with_its_fields_in_order() {
         let fields: Vec<&str> = fields.map(|field| field.name).collect();
         assert_eq!(values, fields, "{}", service.name());
         if service == Service::SetIntegrator {
-            let methods = codes(&row[2])
-                .into_iter()
-                .filter_map(|name| name.parse().ok());
-            assert_eq!(methods.collect::<Vec<Method>>(), Method::ALL);
+            let names = codes(&row[2]).into_iter();
+            let methods: Vec<Method> = names.filter_map(|name| name.parse().ok()).collect();
+            assert_eq!(methods, Method::ALL);
         }
     }
 }
@@ -114,11 +107,8 @@ fn defaults<const N: usize>() -> Vec<String> {
     let simulation = Simulation::new(Arm::<N>::default(), gains);
     let arm = simulation.arm();
     let list = |values: &[f64]| {
-        values
-            .iter()
-            .map(f64::to_string)
-            .collect::<Vec<_>>()
-            .join(", ")
+        let values: Vec<String> = values.iter().map(f64::to_string).collect();
+        values.join(", ")
     };
     let [masses, lengths] = [arm.masses(), arm.lengths()].map(|values| {
         assert!(values.iter().all(|value| *value == values[0]));

@@ -1,42 +1,15 @@
-//! Expressions that are accepted: their values, how many nodes they have and how they are printed. `properties.rs` has the operators and
-//! functions, and the rules `function-1` to `function-7` of the conformance tests have the precedences.
+//! Expressions that are accepted: the values of literals, and how expressions are printed. `properties.rs` has the operators and functions.
+//! It also reads every printed expression again, so the table of printed texts has the precedences.
 //!
 //! **Invariant:** nothing here is rejected.
 
-use super::{T, parse, value};
+use super::{parse, value};
 
 #[test]
-#[allow(clippy::too_many_lines, reason = "a table")]
 fn every_text_of_the_table_has_its_value() {
     let table = [
         // Rounding tells the groupings apart: (0.1 + 0.2) + 0.3 is one ulp above 0.1 + (0.2 + 0.3).
         ("0.1+0.2+0.3", 0.600_000_000_000_000_1),
-        // Unary minus binds tighter than power.
-        ("-2^2", 4.0),
-        ("-t^2", (-T).powf(2.0)),
-        ("2^-1", 0.5),
-        // 2^((-3)^2), and (-2)^(-2).
-        ("2^-3^2", 512.0),
-        ("-2^-2", 0.25),
-        ("-(2^2)", -4.0),
-        ("0-2^2", -4.0),
-        // Unary minus is allowed before every value.
-        ("-3", -3.0),
-        ("1--1", 2.0),
-        ("1+-1", 0.0),
-        ("2*-3", -6.0),
-        ("6/-3", -2.0),
-        ("-(1+2)", -3.0),
-        ("(-3)", -3.0),
-        ("abs(-3)", 3.0),
-        ("-abs(3)", -3.0),
-        ("-3*-2", 6.0),
-        // Unary minus repeats.
-        ("--t", T),
-        ("---t", -T),
-        ("- - t", T),
-        ("2---1", 1.0),
-        ("2^--1", 2.0),
         // Literals may leave out either side of the point.
         ("0", 0.0),
         ("7", 7.0),
@@ -65,13 +38,6 @@ fn every_text_of_the_table_has_its_value() {
         ("1e99999999999999999999999999", f64::INFINITY),
         ("0e99999999999999999999999999", 0.0),
         ("1e-99999999999999999999999999", 0.0),
-        // Functions nest and combine.
-        ("exp(-t)*cos(5*t)", (-T).exp() * (5.0 * T).cos()),
-        ("sqrt(abs(sin(-t)))", (-T).sin().abs().sqrt()),
-        ("2*sin(t)^2", 2.0 * T.sin().powf(2.0)),
-        ("-sin(t)^2", (-T.sin()).powf(2.0)),
-        ("2^sin(t)", 2.0_f64.powf(T.sin())),
-        ("1/(1+t*t)", 1.0 / (1.0 + T * T)),
     ];
     for (text, expected) in table {
         assert_eq!(value(text), expected, "{text}");

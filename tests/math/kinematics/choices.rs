@@ -7,31 +7,18 @@ fn the_elbow_that_moves_the_joints_less_is_chosen() {
     let lengths = [1.0, 0.8];
     for bend in [0.2, 1.0, 2.9] {
         let DVec2 { x, y } = forward(&lengths, &[0.6, bend]).position;
-        for present in [
-            [0.6, bend],
-            [0.9, 0.1],
-            [-3.0, 2.0],
-            [2.0, -0.4],
-            [100.0, -7.0],
-        ] {
+        let others = [[0.9, 0.1], [-3.0, 2.0], [2.0, -0.4], [100.0, -7.0]];
+        for present in others.into_iter().chain([[0.6, bend]]) {
             let chosen = solve(&lengths, &present, &at(x, y)).unwrap();
             // The other elbow mirrors the triangle about the target's bearing.
             let plus = [0.6, bend];
             let minus = [wrap(2.0 * y.atan2(x) - plus[0]), -bend];
             assert!(miss(&lengths, &minus, &at(x, y)) < 1e-15);
-            let nearer = if cost(&plus, &present) < cost(&minus, &present) {
-                plus
-            } else {
-                minus
-            };
-            assert!(
-                (chosen[1] - nearer[1]).abs() < 1e-13,
-                "{bend} {present:?}: {chosen:?}"
-            );
-            assert!(
-                (chosen[0] - nearer[0]).abs() < 1e-13,
-                "{bend} {present:?}: {chosen:?}"
-            );
+            let is_plus = cost(&plus, &present) < cost(&minus, &present);
+            let nearer = if is_plus { plus } else { minus };
+            for (chosen, nearer) in chosen.iter().zip(nearer) {
+                assert!((chosen - nearer).abs() < 1e-13, "{bend} {present:?}");
+            }
         }
     }
 }
@@ -107,34 +94,30 @@ proptest! {
     }
 }
 
+/// Near full stretch the width of the range of orientations is the root of the remaining reach. The distance is right to
+/// the last digit, but the ends of the range only to 1e-8 rad. So it is near the hole in the middle, with everything
+/// folded.
 #[test]
 fn a_present_orientation_is_kept_to_the_last_digit_where_its_range_is_narrowest() {
-    // Near full stretch the width of the range of orientations is the root of the remaining reach. The distance is
-    // right to the last digit, but the ends of the range only to 1e-8 rad.
-    for lengths in [[1.0, 0.7, 0.5], [1.0, 0.7, 2.5]] {
-        for hair in [1e-7, 1e-8, 1e-9, 1e-12] {
+    let check = |lengths: [f64; 3], present: [f64; 3], tolerance: f64| {
+        let DVec2 { x, y } = forward(&lengths, &present).position;
+        let q = solve(&lengths, &present, &at(x, y)).unwrap();
+        let before = forward(&lengths, &present).orientation;
+        let after = forward(&lengths, &q).orientation;
+        let kept = turn(before, after).abs() < tolerance;
+        assert!(kept, "{lengths:?} {present:?}: {q:?}");
+    };
+    for hair in [1e-7, 1e-8, 1e-9, 1e-12] {
+        for lengths in [[1.0, 0.7, 0.5], [1.0, 0.7, 2.5]] {
             for present in [[0.3, 0.0, hair], [0.3, hair, 0.0], [-2.0, hair, -hair]] {
-                let DVec2 { x, y } = forward(&lengths, &present).position;
-                let q = solve(&lengths, &present, &at(x, y)).unwrap();
-                let before = forward(&lengths, &present).orientation;
-                let after = forward(&lengths, &q).orientation;
-                assert!(turn(before, after).abs() < 1e-15, "{present:?}: {q:?}");
+                check(lengths, present, 1e-15);
             }
         }
     }
-    // And so it is near the hole in the middle, with everything folded.
-    let lengths = [2.0, 0.5, 0.6];
     for hair in [1e-8, 1e-9, 1e-12] {
-        for present in [
-            [0.3, PI, PI - hair],
-            [0.3, PI - hair, PI],
-            [-2.0, PI - hair, hair - PI],
-        ] {
-            let DVec2 { x, y } = forward(&lengths, &present).position;
-            let q = solve(&lengths, &present, &at(x, y)).unwrap();
-            let before = forward(&lengths, &present).orientation;
-            let after = forward(&lengths, &q).orientation;
-            assert!(turn(before, after).abs() < 4e-15, "{present:?}: {q:?}");
+        let (near, far) = (PI - hair, hair - PI);
+        for present in [[0.3, PI, near], [0.3, near, PI], [-2.0, near, far]] {
+            check([2.0, 0.5, 0.6], present, 4e-15);
         }
     }
 }
@@ -152,29 +135,23 @@ fn two_orientations_equally_near_give_the_counter_clockwise_one() {
 
 #[test]
 fn with_the_target_on_the_base_all_orientations_are_admissible_or_none() {
-    let present = [0.3, 1.0, -0.4];
-    let q = solve(&[1.0, 0.8, 0.5], &present, &at(0.0, 0.0)).unwrap();
-    assert!(turn(forward(&[1.0, 0.8, 0.5], &q).orientation, 0.9).abs() < 1e-15);
-    assert!(miss(&[1.0, 0.8, 0.5], &q, &at(0.0, 0.0)) < 1e-15);
-    assert!(matches!(
-        solve(&[1.0, 0.8, 2.5], &present, &at(0.0, 0.0)),
-        Err(Unreachable::TooClose { .. })
-    ));
-    // A hole so small that it counts as none.
-    let hole = [1.0, 0.5, 1.5 + 1e-9];
-    let q = solve(&hole, &present, &at(0.0, 0.0)).unwrap();
-    assert!(turn(forward(&hole, &q).orientation, 0.9).abs() < 1e-15);
-    assert!(miss(&hole, &q, &at(0.0, 0.0)) <= BOUNDARY);
+    let (present, base) = ([0.3, 1.0, -0.4], at(0.0, 0.0));
+    // The second has a hole so small that it counts as none.
+    for (lengths, off) in [([1.0, 0.8, 0.5], 1e-15), ([1.0, 0.5, 1.5 + 1e-9], BOUNDARY)] {
+        let q = solve(&lengths, &present, &base).unwrap();
+        assert!(turn(forward(&lengths, &q).orientation, 0.9).abs() < 1e-15);
+        assert!(miss(&lengths, &q, &base) <= off);
+    }
+    let refused = solve(&[1.0, 0.8, 2.5], &present, &base);
+    assert!(matches!(refused, Err(Unreachable::TooClose { .. })));
 }
 
 #[test]
 fn two_links_ignore_every_orientation() {
     let plain = solve(&[1.0, 1.0], &[0.0; 2], &at(1.0, 0.3)).unwrap();
     for phi in [0.0, 3.0, 1e300, f64::NAN, f64::INFINITY] {
-        assert_eq!(
-            solve(&[1.0, 1.0], &[0.0; 2], &aimed(1.0, 0.3, phi)),
-            Ok(plain)
-        );
+        let solved = solve(&[1.0, 1.0], &[0.0; 2], &aimed(1.0, 0.3, phi));
+        assert_eq!(solved, Ok(plain));
     }
 }
 

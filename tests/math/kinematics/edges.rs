@@ -10,11 +10,8 @@ fn edges() -> Vec<(Vec<f64>, Target, DVec2)> {
             let along = DVec2::from_angle(bearing);
             let mut edge = |lengths: &[f64], distance: f64, outward: DVec2| {
                 let lengths = lengths.iter().map(|l| l * scale).collect();
-                let target = Target {
-                    position: scale * distance * along,
-                    orientation: None,
-                };
-                edges.push((lengths, target, outward));
+                let DVec2 { x, y } = scale * distance * along;
+                edges.push((lengths, at(x, y), outward));
             };
             edge(&[1.0, 1.0], 2.0, along);
             edge(&[2.0, 0.5], 2.5, along);
@@ -29,12 +26,9 @@ fn edges() -> Vec<(Vec<f64>, Target, DVec2)> {
                 ([1.0, 0.5, 0.3], 1.5, along),
                 ([1.0, 0.5, 0.3], 0.5, -along),
             ] {
-                let position = scale * (wrist * along + 0.3 * DVec2::from_angle(across));
-                let target = Target {
-                    position,
-                    orientation: Some(across),
-                };
-                edges.push((lengths.map(|l| l * scale).to_vec(), target, outward));
+                let DVec2 { x, y } = scale * (wrist * along + 0.3 * DVec2::from_angle(across));
+                let lengths = lengths.map(|l| l * scale).to_vec();
+                edges.push((lengths, aimed(x, y, across), outward));
             }
         }
     }
@@ -52,40 +46,23 @@ fn solve_any(lengths: &[f64], target: &Target) -> Result<f64, Unreachable> {
 }
 
 #[test]
-fn a_target_within_a_billionth_of_the_arm_outside_its_reach_is_solved_as_the_boundary() {
+fn a_target_within_a_billionth_of_the_arm_outside_its_reach_is_the_boundary_and_beyond_refused() {
     for (lengths, edge, outward) in edges() {
         let sum: f64 = lengths.iter().sum();
+        let moved = |share: f64| Target {
+            position: edge.position + share * BOUNDARY * sum * outward,
+            ..edge
+        };
         for share in [-1.0, -0.5, -1e-3, -1e-6, 0.0, 1e-6, 1e-3, 0.5, 0.999] {
-            let moved = edge.position + share * BOUNDARY * sum * outward;
-            let target = Target {
-                position: moved,
-                ..edge
-            };
-            let off = solve_any(&lengths, &target).unwrap_or_else(|e| panic!("{lengths:?}: {e}"));
+            let off = solve_any(&lengths, &moved(share));
+            let off = off.unwrap_or_else(|e| panic!("{lengths:?} {edge:?} {share}: {e}"));
             // On the boundary: the error is the target's distance from it, and no more.
-            let outside = BOUNDARY * f64::max(share, 0.0);
-            assert!(
-                (off - outside).abs() <= 1e-15,
-                "{lengths:?} {target:?} is {off:e} off"
-            );
+            let error = (off - BOUNDARY * f64::max(share, 0.0)).abs();
+            assert!(error <= 1e-15, "{lengths:?} {edge:?} {share}: {off:e} off");
         }
-    }
-}
-
-#[test]
-fn a_target_farther_outside_is_refused() {
-    for (lengths, edge, outward) in edges() {
-        let sum: f64 = lengths.iter().sum();
         for share in [1.001, 2.0, 1e3, 1e6] {
-            let moved = edge.position + share * BOUNDARY * sum * outward;
-            let target = Target {
-                position: moved,
-                ..edge
-            };
-            assert!(
-                solve_any(&lengths, &target).is_err(),
-                "{lengths:?} {target:?}"
-            );
+            let solved = solve_any(&lengths, &moved(share));
+            assert!(solved.is_err(), "{lengths:?} {edge:?} {share}");
         }
     }
 }
@@ -112,10 +89,8 @@ fn targets_a_hair_from_the_base_keep_their_direction() {
     for distance in [1e-17, 1e-100, 1e-300, 5e-324] {
         let q = solve(&[1.0, 1.0], &[0.0, 0.0], &at(0.0, distance)).unwrap();
         assert!(q[1].abs() > 3.0);
-        assert!(
-            ((q[0] + q[1] / 2.0) - FRAC_PI_2).abs() < 1e-15 || q[1] < 0.0,
-            "{q:?}"
-        );
+        let off = (q[0] + q[1] / 2.0) - FRAC_PI_2;
+        assert!(off.abs() < 1e-15 || q[1] < 0.0, "{q:?}");
         assert!(miss(&[1.0, 1.0], &q, &at(0.0, 0.0)) < 1e-15);
     }
 }
@@ -132,33 +107,22 @@ fn lengths_and_targets_at_the_ends_of_the_number_range_are_solved_or_refused() {
         assert!(miss(&three, &solve(&three, &[0.0; 3], &aimed).unwrap(), &aimed) < 1e-15);
     }
     // With a link of negligible length, the reach is still the circle of the other link.
-    for lengths in [
-        [1e300, 1e-300],
-        [1e-300, 1e300],
-        [f64::MAX, 5e-324],
-        [5e-324, f64::MAX],
-    ] {
-        let far = lengths[0].max(lengths[1]);
-        let q = solve(&lengths, &[0.0; 2], &at(0.0, far)).unwrap();
-        assert!((forward(&lengths, &q).position.y / far - 1.0).abs() < 1e-15);
+    for (long, short) in [(1e300, 1e-300), (f64::MAX, 5e-324)] {
+        for lengths in [[long, short], [short, long]] {
+            let q = solve(&lengths, &[0.0; 2], &at(0.0, long)).unwrap();
+            assert!((forward(&lengths, &q).position.y / long - 1.0).abs() < 1e-15);
+        }
     }
     assert!(solve(&[5e-324, 5e-324], &[0.0; 2], &at(0.0, 5e-324)).is_ok());
     assert!(solve(&[f64::MAX; 3], &[0.0; 3], &at(f64::MAX, f64::MAX)).is_ok());
     for huge in [1e300, f64::MAX] {
         for target in [at(huge, huge), at(-huge, 0.0), at(0.0, huge)] {
-            assert!(matches!(
-                solve(&[1.0, 1.0], &[0.0; 2], &target),
-                Err(Unreachable::Beyond { .. })
-            ));
-            let aimed = Target {
-                orientation: Some(1e300),
-                ..target
-            };
+            let refused = solve(&[1.0, 1.0], &[0.0; 2], &target);
+            assert!(matches!(refused, Err(Unreachable::Beyond { .. })));
+            let aimed = aimed(target.position.x, target.position.y, 1e300);
             for lengths in [[1.0; 3], [1e-300; 3]] {
-                assert!(matches!(
-                    solve(&lengths, &[0.0; 3], &aimed),
-                    Err(Unreachable::Beyond { .. })
-                ));
+                let refused = solve(&lengths, &[0.0; 3], &aimed);
+                assert!(matches!(refused, Err(Unreachable::Beyond { .. })));
             }
         }
     }

@@ -15,6 +15,8 @@ use pendularm::math::kinematics::{
 use proptest::prelude::*;
 use serde_json::Value;
 
+use crate::stored::entries;
+
 /// Error that contract and oracle allow in a round trip, as a share of the sum of the lengths.
 const ROUND_TRIP: f64 = 1e-9;
 
@@ -24,26 +26,10 @@ const ROUND_TRIP: f64 = 1e-9;
 const INTERIOR: f64 = 4e-15;
 
 fn oracle(kind: &str) -> Vec<Value> {
-    let text = include_str!("../../data/kinematics.json");
-    let document: Value = serde_json::from_str(text).unwrap();
-    let cases = document["cases"].as_array().unwrap();
-    let cases: Vec<_> = cases
-        .iter()
-        .filter(|case| case["type"] == kind)
-        .cloned()
-        .collect();
+    let mut cases = entries(include_str!("../../data/kinematics.json"), "cases");
+    cases.retain(|case| case["type"] == kind);
     assert!(!cases.is_empty());
     cases
-}
-
-fn numbers<const N: usize>(value: &Value) -> [f64; N] {
-    let list: Vec<f64> = value
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|x| x.as_f64().unwrap())
-        .collect();
-    list.try_into().unwrap()
 }
 
 fn at(x: f64, y: f64) -> Target {
@@ -55,8 +41,8 @@ fn at(x: f64, y: f64) -> Target {
 
 fn aimed(x: f64, y: f64, phi: f64) -> Target {
     Target {
-        position: dvec2(x, y),
         orientation: Some(phi),
+        ..at(x, y)
     }
 }
 

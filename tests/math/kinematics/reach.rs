@@ -35,14 +35,11 @@ fn angle() -> impl Strategy<Value = f64> {
 /// The contract's bar is [`ROUND_TRIP`]; a target inside the reach is held to [`INTERIOR`].
 fn check_round_trip<const N: usize>(lengths: &[f64; N], present: &[f64; N], target: &Target) {
     const { assert!(INTERIOR < ROUND_TRIP) };
-    let q = solve(lengths, present, target)
-        .unwrap_or_else(|e| panic!("{lengths:?} {present:?} {target:?}: {e}"));
+    let told = format!("{lengths:?} {present:?} {target:?}");
+    let q = solve(lengths, present, target).unwrap_or_else(|e| panic!("{told}: {e}"));
     assert_wrapped(&q);
     let off = miss(lengths, &q, target);
-    assert!(
-        off <= INTERIOR,
-        "{lengths:?} {present:?} {target:?}: {q:?} is {off:e} off"
-    );
+    assert!(off <= INTERIOR, "{told}: {q:?} is {off:e} off");
     if let (3, Some(phi)) = (N, target.orientation) {
         assert!(turn(forward(lengths, &q).orientation, phi).abs() <= 1e-14);
     }

@@ -50,10 +50,8 @@ fn a_value_that_is_no_number_is_refused_by_name() {
         assert_eq!(refusal([1.0, 1.0], at(bad, 0.0)), "x must be finite");
         assert_eq!(refusal([1.0, 1.0], at(0.0, bad)), "y must be finite");
         assert_eq!(refusal([1.0; 3], at(0.0, bad)), "y must be finite");
-        assert_eq!(
-            refusal([1.0; 3], aimed(1.0, 0.0, bad)),
-            "phi must be finite"
-        );
+        let phi = refusal([1.0; 3], aimed(1.0, 0.0, bad));
+        assert_eq!(phi, "phi must be finite");
     }
     // A present pose that is not finite is allowed.
     let q = solve(&[1.0; 3], &[f64::NAN, f64::INFINITY, 0.0], &at(1.0, 1.0)).unwrap();
@@ -62,14 +60,10 @@ fn a_value_that_is_no_number_is_refused_by_name() {
 
 #[test]
 fn other_numbers_of_links_have_no_closed_form() {
-    assert_eq!(
-        solve(&[1.0; 4], &[0.0; 4], &at(1.0, 0.0)),
-        Err(Unreachable::Links(4))
-    );
-    assert_eq!(
-        refusal([1.0], at(1.0, 0.0)),
-        "inverse kinematics is solved for 2 or 3 links, not 1"
-    );
+    let four = solve(&[1.0; 4], &[0.0; 4], &at(1.0, 0.0));
+    assert_eq!(four, Err(Unreachable::Links(4)));
+    let one = refusal([1.0], at(1.0, 0.0));
+    assert_eq!(one, "inverse kinematics is solved for 2 or 3 links, not 1");
 }
 
 #[test]

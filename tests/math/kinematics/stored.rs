@@ -1,58 +1,43 @@
 //! Against stored 60-digit values.
 
 use super::*;
+use crate::stored::{array, for_links, number};
 
 /// The stored `sens` is the sum of `lᵢ (1 + |q₁| + … + |qᵢ|)`, the cost of rounding each *summed* angle. Composed
 /// rotations lose less. The data set has the bar 8·2⁻⁵³.
 fn check_forward<const N: usize>(case: &Value) {
-    let lengths = numbers::<N>(&case["lengths"]);
-    let q = numbers::<N>(&case["q"]);
-    let bound = 4.0 * f64::EPSILON * case["sens"].as_f64().unwrap();
+    let (lengths, q) = (array::<N>(&case["lengths"]), array(&case["q"]));
+    let bound = 4.0 * f64::EPSILON * number(&case["sens"]);
     let ends = joints(&lengths, &q);
     for (i, end) in ends.iter().enumerate() {
-        let [x, y] = numbers::<2>(&case["joints"][i + 1]);
-        assert!(
-            (*end - dvec2(x, y)).length() <= bound,
-            "{case}: joint {i} at {end}"
-        );
+        let off = *end - DVec2::from(array(&case["joints"][i + 1]));
+        assert!(off.length() <= bound, "{case}: joint {i} at {end}");
     }
     let tip = forward(&lengths, &q);
     assert_eq!(tip.position, ends[N - 1]);
-    let phi = case["phi"].as_f64().unwrap();
+    let phi = number(&case["phi"]);
     let size: f64 = q.iter().map(|q| q.abs()).sum();
-    assert!(
-        (tip.orientation - phi).abs() <= 4.0 * f64::EPSILON * size,
-        "{case}"
-    );
+    let off = (tip.orientation - phi).abs();
+    assert!(off <= 4.0 * f64::EPSILON * size, "{case}");
     let along = heading(&q);
-    assert!(
-        (along.y.atan2(along.x) - wrap(phi)).abs() <= 1e-15 * (4.0 + size),
-        "{case}"
-    );
+    let off = (along.y.atan2(along.x) - wrap(phi)).abs();
+    assert!(off <= 1e-15 * (4.0 + size), "{case}");
 }
 
 #[test]
 fn forward_kinematics_agrees_with_the_stored_values() {
     for case in oracle("fk") {
-        match case["n"].as_u64().unwrap() {
-            2 => check_forward::<2>(&case),
-            3 => check_forward::<3>(&case),
-            n => panic!("{n} links"),
-        }
-    }
-}
-
-fn target_of(case: &Value) -> Target {
-    Target {
-        position: dvec2(case["x"].as_f64().unwrap(), case["y"].as_f64().unwrap()),
-        orientation: case["phi"].as_f64(),
+        for_links!(case, check_forward(&case));
     }
 }
 
 /// Solves a stored case from several present poses; each stored elbow, taken as the present pose, must come back.
 fn check_inverse<const N: usize>(case: &Value) {
-    let lengths = numbers::<N>(&case["lengths"]);
-    let target = target_of(case);
+    let lengths = array::<N>(&case["lengths"]);
+    let target = Target {
+        orientation: case["phi"].as_f64(),
+        ..at(number(&case["x"]), number(&case["y"]))
+    };
     let poses = [[0.0; N], [1.0; N], [-2.5; N], [PI; N], [1e8; N], [-40.0; N]];
     if case["reachable"] == false {
         for present in &poses {
@@ -73,31 +58,25 @@ fn check_inverse<const N: usize>(case: &Value) {
     for present in &poses {
         let q = solve(&lengths, present, &target).unwrap_or_else(|e| panic!("{case}: {e}"));
         assert_wrapped(&q);
-        let bar = if case["class"] == "interior" {
-            INTERIOR
-        } else {
-            1e-13
-        };
+        let is_interior = case["class"] == "interior";
+        let bar = if is_interior { INTERIOR } else { 1e-13 };
         assert!(miss(&lengths, &q, &target) <= bar, "{case}: {q:?}");
         if let Some(phi) = target.orientation {
-            assert!(
-                turn(forward(&lengths, &q).orientation, phi).abs() <= 1e-15 * (8.0 + phi.abs())
-            );
+            let off = turn(forward(&lengths, &q).orientation, phi).abs();
+            assert!(off <= 1e-15 * (8.0 + phi.abs()), "{case}");
         }
     }
     for solution in case["solutions"].as_array().into_iter().flatten() {
         let Some(condition) = solution["q_cond"].as_f64() else {
             continue;
         };
-        let expected = numbers::<N>(&solution["q"]);
+        let expected = array::<N>(&solution["q"]);
         let q = solve(&lengths, &expected, &target).unwrap();
         // Rounding of the target itself, magnified by the condition, plus that of the angles.
         let bar = 8.0 * f64::EPSILON * condition.max(4.0);
         for (q, expected) in q.iter().zip(&expected) {
-            assert!(
-                turn(*expected, *q).abs() <= bar,
-                "{case}: {q} for {expected}"
-            );
+            let off = turn(*expected, *q).abs();
+            assert!(off <= bar, "{case}: {q} for {expected}");
         }
     }
 }
@@ -105,10 +84,6 @@ fn check_inverse<const N: usize>(case: &Value) {
 #[test]
 fn every_stored_inverse_case_is_solved_or_refused_as_it_should_be() {
     for case in oracle("ik") {
-        match case["n"].as_u64().unwrap() {
-            2 => check_inverse::<2>(&case),
-            3 => check_inverse::<3>(&case),
-            n => panic!("{n} links"),
-        }
+        for_links!(case, check_inverse(&case));
     }
 }

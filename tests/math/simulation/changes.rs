@@ -35,11 +35,7 @@ fn disabling_control_zeroes_the_effort_at_once_and_leaves_the_motion() {
     assert_eq!(simulation.state(), &state);
     let setpoint = *simulation.pid().setpoint();
     simulation.enable(true);
-    assert_eq!(
-        simulation.effort(),
-        &[0.0; 2],
-        "no step has been taken since"
-    );
+    assert_eq!(simulation.effort(), &[0.0; 2], "no step since");
     assert_eq!(simulation.pid().integral(), &[0.0; 2]);
     assert_eq!(simulation.pid().setpoint(), &setpoint);
 }
@@ -76,15 +72,16 @@ fn pushed_steps(timestep: f64, duration: f64, before: u64) -> u64 {
 /// little more than 11.
 #[test]
 fn a_disturbance_is_in_every_step_that_begins_within_its_time() {
-    for before in [0, 1, 7, 1000] {
-        assert_eq!(pushed_steps(0.1, 1.1, before), 11);
-        assert_eq!(pushed_steps(0.1, 0.3, before), 3);
-        assert_eq!(pushed_steps(0.1, 0.7, before), 7);
-        assert_eq!(pushed_steps(0.1, 0.25, before), 3);
-        assert_eq!(pushed_steps(0.001, 0.1, before), 100);
-        assert_eq!(pushed_steps(0.001, 1e-9, before), 1);
-        assert_eq!(pushed_steps(0.001, 5e-324, before), 1);
-        assert_eq!(pushed_steps(0.001, f64::MAX, before), 200);
+    for (timestep, durations) in [
+        (0.1, [(1.1, 11), (0.3, 3), (0.7, 7), (0.25, 3)]),
+        (0.001, [(0.1, 100), (1e-9, 1), (5e-324, 1), (f64::MAX, 200)]),
+    ] {
+        for (duration, steps) in durations {
+            for before in [0, 1, 7, 1000] {
+                let pushed = pushed_steps(timestep, duration, before);
+                assert_eq!(pushed, steps, "{timestep} {duration} {before}");
+            }
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! The live loop: motion against 50-digit references, determinism, and the effects of each call.
+//! The live loop: motion, determinism, and the effects of each call.
 
 mod changes;
 mod motion;
@@ -10,32 +10,39 @@ use pendularm::math::integrator::{Method, increment, two_sum};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 
+use crate::stored::gains;
+
 fn no_gains<const N: usize>() -> Gains<N> {
-    Gains {
-        kp: [0.0; N],
-        ki: [0.0; N],
-        kd: [0.0; N],
-    }
+    gains([0.0; N], [0.0; N], [0.0; N])
 }
 
-/// Steps under constant efforts with only the method and the dynamics, summed like in the simulation.
+/// Steps without effort, with only the method and the dynamics, summed like in the simulation.
 struct Offline<const N: usize> {
     arm: Arm<N>,
     method: Method,
     dt: f64,
-    tau: [f64; N],
     state: State<N>,
     carry: State<N>,
 }
 
 impl<const N: usize> Offline<N> {
+    fn new(arm: Arm<N>, method: Method, dt: f64, state: State<N>) -> Self {
+        Self {
+            arm,
+            method,
+            dt,
+            state,
+            carry: State::rest(),
+        }
+    }
+
     fn step(&mut self) {
         let State {
             position: q,
             velocity: v,
         } = &mut self.state;
         let acceleration =
-            |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(&self.arm, q, v, &self.tau);
+            |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(&self.arm, q, v, &[0.0; N]);
         let (dq, dv) = increment(self.method, acceleration, 0.0, q, v, self.dt);
         for i in 0..N {
             (q[i], self.carry.position[i]) = two_sum(q[i], dq[i] + self.carry.position[i]);

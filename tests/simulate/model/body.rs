@@ -1,7 +1,5 @@
 //! The body of a message in either encoding: its sender, and a comparison with the sent body.
 
-use serde::Deserialize;
-
 use crate::json::Json;
 
 /// A message's body, in either encoding.
@@ -14,22 +12,12 @@ pub(super) enum Body<'a> {
 impl Body<'_> {
     /// Its publisher and its number.
     pub(super) fn origin(&self) -> Option<(u64, u64)> {
-        #[derive(Deserialize)]
-        struct Origin {
-            from: u64,
-            number: u64,
-        }
-        match self {
-            Self::Text(text) => {
-                let origin: Origin = serde_json::from_str(text).ok()?;
-                Some((origin.from, origin.number))
-            }
-            Self::Binary(msg) => {
-                let number =
-                    |name: &str| msg.get(name).and_then(Json::number).map(|one| one as u64);
-                number("from").zip(number("number"))
-            }
-        }
+        let read = match self {
+            Self::Text(text) => &Json::read(text)?,
+            Self::Binary(msg) => *msg,
+        };
+        let number = |name: &str| read.get(name).and_then(Json::number).map(|one| one as u64);
+        number("from").zip(number("number"))
     }
 
     /// Whether it equals the sent body: in every byte, or in another encoding in every value.
@@ -45,17 +33,13 @@ fn are_same(one: &Json, other: &Json) -> bool {
     match (one, other) {
         (Json::Number(_), Json::Number(_)) => one.number() == other.number(),
         (Json::Array(ones), Json::Array(others)) => {
-            ones.len() == others.len()
-                && ones
-                    .iter()
-                    .zip(others)
-                    .all(|(one, other)| are_same(one, other))
+            let mut pairs = ones.iter().zip(others);
+            ones.len() == others.len() && pairs.all(|(one, other)| are_same(one, other))
         }
         (Json::Object(ones), Json::Object(others)) => {
             let all = |(key, one): &(Option<String>, Json)| {
-                key.as_deref()
-                    .and_then(|key| other.get(key))
-                    .is_some_and(|other| are_same(one, other))
+                let found = key.as_deref().and_then(|key| other.get(key));
+                found.is_some_and(|other| are_same(one, other))
             };
             ones.len() == others.len() && ones.iter().all(all)
         }

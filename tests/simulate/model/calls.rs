@@ -11,6 +11,10 @@ use crate::court::Court;
 use crate::honest::{Expect, Honest};
 use crate::json::Json;
 
+fn read(values: &RawValue) -> Value {
+    serde_json::from_str(values.get()).unwrap_or_default()
+}
+
 /// The status of a cancelled goal.
 const CANCELED: &str = "5";
 
@@ -77,7 +81,7 @@ impl Model {
         if frame.service.as_deref() != call.what.split(' ').next() {
             return court.wrong(format!("the answer to {} says {text:.200}", call.what));
         }
-        let Some(status) = Value::from_raw(status) else {
+        let Ok(status) = serde_json::from_str::<String>(status.get()) else {
             return court.wrong(format!("an answer's status is no text: {text:.200}"));
         };
         let lacks_room = status.contains("too many bytes") || status.contains("busy");
@@ -91,14 +95,13 @@ impl Model {
             Expect::Success => (!result).then(|| "it should succeed".to_owned()),
             Expect::Refusal => result.then(|| "it should be refused".to_owned()),
             Expect::Member(name) => {
-                let value: Value = serde_json::from_str(values.get()).unwrap_or_default();
-                (!result || value.get(name).is_none()).then(|| format!("it should have {name}"))
+                let is_there = result && read(values).get(name).is_some();
+                (!is_there).then(|| format!("it should have {name}"))
             }
             Expect::Computed { entries, .. } => {
-                let value: Value = serde_json::from_str(values.get()).unwrap_or_default();
-                let came = value["times"].as_array().map(Vec::len);
-                (!result || came != Some(entries))
-                    .then(|| format!("{came:?} entries instead of {entries}"))
+                let came = read(values)["times"].as_array().map(Vec::len);
+                let is_whole = result && came == Some(entries);
+                (!is_whole).then(|| format!("{came:?} entries instead of {entries}"))
             }
             Expect::Forwarded(number) => {
                 self.forwarded(honest.is_hampered, number, values.get(), result, &status)
@@ -172,37 +175,24 @@ impl Model {
         if result {
             return Some(format!("its provider said {:?}", forward.answered));
         }
-        let provided = self
-            .services
-            .get(&absolute(&forward.service))
-            .copied()
-            .unwrap_or_default();
+        let provided = self.services.get(&absolute(&forward.service)).copied();
+        let provided = provided.unwrap_or_default();
         let is_unsettled = provided.provider.is_none()
             || !provided.is_confirmed
             || provided.is_contested
             || provided.changed >= forward.turns.saturating_sub(200);
         let deadline = forward.since + forward.timeout;
-        let was_answered_in_time = forward
-            .answered
-            .is_some_and(|(when, _, _)| when + Duration::from_millis(50) < deadline);
-        let was_forgotten = forward
+        let answered = forward.answered.map(|(when, ..)| when);
+        let was_answered_in_time =
+            answered.is_some_and(|when| when + Duration::from_millis(50) < deadline);
+        let gone = forward
             .orphaned
-            .is_some_and(|when| now > when + Duration::from_secs(1));
-        if was_forgotten && !hampered {
+            .map(|when| now.saturating_duration_since(when));
+        if gone.is_some_and(|gone| gone > Duration::from_secs(1)) && !hampered {
             return Some("its provider has been gone for more than a second".to_owned());
         }
         let is_late = now >= deadline && (!was_answered_in_time || hampered);
         (!is_late && !is_unsettled && !self.is_scarce)
             .then(|| format!("nothing speaks for {status:?}"))
-    }
-}
-
-trait FromRaw: Sized {
-    fn from_raw(raw: &RawValue) -> Option<String>;
-}
-
-impl FromRaw for Value {
-    fn from_raw(raw: &RawValue) -> Option<String> {
-        serde_json::from_str(raw.get()).ok()
     }
 }

@@ -86,6 +86,16 @@ pub struct Provided {
     pub changed: u64,
 }
 
+impl Provided {
+    /// Nobody provides it any more.
+    pub fn none(changed: u64) -> Self {
+        Self {
+            changed,
+            ..Self::default()
+        }
+    }
+}
+
 /// A call that a client has received as a provider.
 pub struct Asked {
     pub provider: u64,

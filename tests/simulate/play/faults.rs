@@ -38,17 +38,13 @@ impl Course {
         }
         one.excuse();
         let (who, handled) = (one.who, one.handled);
-        let doubtful: Vec<u64> = one
-            .published
-            .iter()
-            .filter(|(_, order)| **order >= handled)
-            .map(|(n, _)| *n)
-            .collect();
+        let mut doubtful = one.published.clone();
+        doubtful.retain(|_, order| *order >= handled);
         for other in &mut self.honest {
             for subscription in other.subscriptions.values_mut() {
                 subscription.newest.remove(&who);
                 let pending = subscription.pending.get_mut(&who).into_iter().flatten();
-                pending.for_each(|(number, must)| *must &= !doubtful.contains(number));
+                pending.for_each(|(number, must)| *must &= !doubtful.contains_key(number));
             }
         }
         self.lose_provider(who);
@@ -61,16 +57,9 @@ impl Course {
             one.orphaned.get_or_insert(Instant::now());
         }
         let changed = self.court.turns.get();
-        for provided in self
-            .model
-            .services
-            .values_mut()
-            .filter(|one| one.provider == Some(who))
-        {
-            *provided = Provided {
-                changed,
-                ..Provided::default()
-            };
+        let services = self.model.services.values_mut();
+        for provided in services.filter(|one| one.provider == Some(who)) {
+            *provided = Provided::none(changed);
         }
     }
 

@@ -26,6 +26,7 @@ const FLOODED_PIECE: usize = 100;
 const STANDSTILL: Duration = Duration::from_secs(10);
 
 /// The outcome of a seed.
+#[derive(Default)]
 pub struct Outcome {
     pub plan: String,
     pub failure: Option<Failure>,
@@ -110,16 +111,12 @@ impl Course {
 
     fn connect(&self, room: usize) -> (Client, Rc<std::cell::Cell<Fate>>) {
         let (stream, fate) = self.world.connect(room);
-        let door = if self.court.chance(self.plan.socket) {
-            Door::Socket
-        } else {
-            Door::Plain
+        let door = match self.court.chance(self.plan.socket) {
+            true => Door::Socket,
+            false => Door::Plain,
         };
-        let piece = if room == self.plan.room {
-            self.plan.piece
-        } else {
-            room
-        };
+        let is_honest = room == self.plan.room;
+        let piece = if is_honest { self.plan.piece } else { room };
         (Client::new(door, stream, piece), fate)
     }
 
@@ -140,11 +137,8 @@ impl Course {
     /// Each client subscribes to a topic, and one provides a service. Otherwise most later actions would have no
     /// effect.
     async fn settle_in(&mut self) {
-        let provides = self
-            .plan
-            .features
-            .iter()
-            .any(|(one, _)| *one == Feature::CallOut);
+        let mut features = self.plan.features.iter();
+        let provides = features.any(|(one, _)| *one == Feature::CallOut);
         for at in 0..self.honest.len() {
             self.workload(at).perform(Feature::Subscribe);
             self.workload(at).perform(Feature::Subscribe);
@@ -193,10 +187,8 @@ impl Course {
         };
         let took = now.saturating_sub(before);
         if took > STANDSTILL {
-            self.court.fail(
-                Verdict::NoProgress,
-                format!("a deed kept the processor for {took:?}"),
-            );
+            let words = format!("a deed kept the processor for {took:?}");
+            self.court.fail(Verdict::NoProgress, words);
         }
     }
 

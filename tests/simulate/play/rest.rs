@@ -6,7 +6,7 @@ use tokio::time::Instant;
 
 use super::Course;
 use crate::court::Verdict;
-use crate::honest::{Expect, Honest, Phase};
+use crate::honest::{Expect, Honest, Phase, Subscription};
 use crate::workload::waits;
 
 /// Virtual time after the last fault within which all required frames arrive.
@@ -34,11 +34,9 @@ impl Course {
             ("\"end4\"", "/arm_sim/reset", "{}"),
         ] {
             sober.send(&format!("{{\"op\":\"call_service\",\"id\":{id},\"service\":\"{service}\",\"args\":{args}}}"), 0);
-            let is_arms = service.starts_with("/arm_sim");
-            let expect = if is_arms {
-                Expect::Success
-            } else {
-                Expect::Anything
+            let expect = match service {
+                "/ik_trial/stop" => Expect::Anything,
+                _ => Expect::Success,
             };
             sober.note_call(id, service, expect, true, &self.court);
         }
@@ -50,12 +48,8 @@ impl Course {
         if self.court.failure().is_some() {
             return;
         }
-        let waiting: Vec<String> = self
-            .honest
-            .iter()
-            .filter(|one| !self.has_all(one))
-            .map(waits)
-            .collect();
+        let waiting = self.honest.iter().filter(|one| !self.has_all(one));
+        let waiting: Vec<String> = waiting.map(waits).collect();
         if !waiting.is_empty() {
             let words = format!(
                 "{LIVENESS:?} after the last fault clients wait: {}",
@@ -82,61 +76,32 @@ impl Course {
     }
 
     fn is_at_rest(&self) -> bool {
-        let all_heard = |one: &Honest| {
-            let pending = one
-                .subscriptions
-                .values()
-                .flat_map(|one| one.pending.values().flatten());
-            one.is_excused || one.has_finished || pending.filter(|(_, must)| *must).count() == 0
-        };
-        let throttled = |one: &Honest| {
-            one.subscriptions
-                .values()
-                .any(|one| one.throttle.is_some() && !has_newest(one))
-        };
-        let quiet = |one: &Honest| {
-            self.has_all(one)
-                && all_heard(one)
-                && (!throttled(one) || one.is_excused || one.has_finished)
-        };
-        self.honest.iter().all(quiet) && self.world.pool.is_idle()
+        let is_quiet =
+            |one: &Honest| self.has_all(one) && missing(one).is_empty() && stale(one).is_none();
+        let mut all = self.honest.iter();
+        all.all(|one| one.is_excused || one.has_finished || is_quiet(one))
+            && self.world.pool.is_idle()
     }
 
     /// Every required message has arrived, and of a throttled topic the newest.
     fn check_messages(&mut self) {
-        for at in 0..self.honest.len() {
-            let one = &self.honest[at];
-            if one.is_excused || one.has_finished {
-                continue;
-            }
-            let subscriptions = one.subscriptions.iter();
-            let missing = |(topic, one): (&String, &crate::honest::Subscription)| {
-                let must: Vec<u64> = one
-                    .pending
-                    .values()
-                    .flatten()
-                    .filter(|(_, must)| *must)
-                    .map(|(n, _)| *n)
-                    .collect();
-                (!must.is_empty()).then(|| (must.len(), format!("{must:?} on {topic}")))
-            };
-            let missing: Vec<(usize, String)> = subscriptions.filter_map(missing).collect();
-            let stale = one
-                .subscriptions
-                .iter()
-                .find(|(_, one)| one.throttle.is_some() && !has_newest(one));
+        for one in self
+            .honest
+            .iter()
+            .filter(|one| !one.is_excused && !one.has_finished)
+        {
             // A hostile client's message may be newer.
             let is_quiet = !one.is_hampered && !self.plan.scarce && self.plan.hostile == 0;
-            if let Some((topic, subscription)) = stale.filter(|_| is_quiet) {
+            if let Some((topic, subscription)) = stale(one).filter(|_| is_quiet) {
                 let (last, newest) = (subscription.last, &subscription.newest);
                 self.court.wrong(format!(
                     "client {} has not received the newest on {topic}: {last:?}, not {newest:?}",
                     one.who
                 ));
             }
-            for (count, which) in missing {
-                self.model
-                    .miss(&self.court, &self.honest[at], count, &which);
+            for (topic, numbers) in missing(one) {
+                let which = format!("{numbers:?} on {topic}");
+                self.model.miss(&self.court, one, numbers.len(), &which);
             }
         }
         let dropped = self.world.gauges.messages_dropped();
@@ -171,8 +136,26 @@ impl Course {
     }
 }
 
+/// The required messages that have not arrived, by topic.
+fn missing(one: &Honest) -> Vec<(&String, Vec<u64>)> {
+    let required = |one: &Subscription| -> Vec<u64> {
+        let pending = one.pending.values().flatten().filter(|(_, must)| *must);
+        pending.map(|(number, _)| *number).collect()
+    };
+    let all = one.subscriptions.iter();
+    let mut all: Vec<_> = all.map(|(topic, one)| (topic, required(one))).collect();
+    all.retain(|(_, numbers)| !numbers.is_empty());
+    all
+}
+
+/// A throttled subscription without the newest message.
+fn stale(one: &Honest) -> Option<(&String, &Subscription)> {
+    let mut all = one.subscriptions.iter();
+    all.find(|(_, one)| one.throttle.is_some() && !has_newest(one))
+}
+
 /// Whether the last received message is the last one of its publisher.
-fn has_newest(one: &crate::honest::Subscription) -> bool {
+fn has_newest(one: &Subscription) -> bool {
     let last = one.last.map(|(number, _)| number);
     // A message from before the subscription, or of a disconnected client, may be handled after newer ones of others.
     let is_from_before = one

@@ -11,20 +11,15 @@ impl Workload<'_> {
         match self.court.below(40) {
             0 => self.compute_long(),
             1..16 => {
-                let q0: Vec<f64> = (0..self.plan.links)
-                    .map(|_| self.number(-1.0, 1.0))
-                    .collect();
+                let q = self.joints(-1.0, 1.0);
                 let (duration, timestep) = (self.number(0.1, 1.0), 0.005);
                 let samples = 2 + self.court.below(40);
                 let arm = Arm::<3>::default();
-                let (masses, lengths) = (
-                    &arm.masses()[..self.plan.links],
-                    &arm.lengths()[..self.plan.links],
-                );
+                let [masses, lengths] =
+                    [arm.masses(), arm.lengths()].map(|all| &all[..self.plan.links]);
                 let gravity = arm.gravity();
                 let params =
                     serde_json::json!({"gravity": gravity, "masses": masses, "lengths": lengths});
-                let q = Value::from(q0);
                 let args = format!(
                     "{{\"q0\":{q},\"duration\":{duration},\"timestep\":{timestep},\"integrator\":\"{name}\",\"params\":{params},\"samples\":{samples}}}"
                 );
@@ -39,9 +34,8 @@ impl Workload<'_> {
             _ => {
                 let function = self.court.among(&FUNCTIONS);
                 let (x0, dt) = (self.number(-1.0, 1.0), self.number(0.001, 0.1));
-                let steps = 1 + self
-                    .court
-                    .below(if self.plan.room < 1000 { 20 } else { 1500 });
+                let most = if self.plan.room < 1000 { 20 } else { 1500 };
+                let steps = 1 + self.court.below(most);
                 let args = format!(
                     "{{\"function\":\"{function}\",\"x0\":{x0},\"dt\":{dt},\"steps\":{steps},\"integrator\":\"{name}\"}}"
                 );
@@ -75,11 +69,7 @@ impl Workload<'_> {
     }
 
     pub(super) fn action(&mut self) {
-        let goals = self.me().calls.iter();
-        let goals: Vec<String> = goals
-            .filter(|(_, call)| matches!(call.expect, Expect::Goal { .. }))
-            .map(|(id, _)| id.clone())
-            .collect();
+        let goals = goals([&*self.me()]);
         if !goals.is_empty() && self.court.chance(0.4) {
             let id = self.court.among(&goals);
             if let Some(goal) = self.me().calls.get_mut(&id) {
@@ -88,10 +78,10 @@ impl Workload<'_> {
             return self.cancel(&id);
         }
         let (id, args, has_feedback) = (self.id(), self.target(), self.court.chance(0.5));
-        self.send(&format!(
-            "{{\"op\":\"send_action_goal\",\"action\":\"/ik_action\",\"action_type\":\"pendularm_interfaces/action/MoveTo\",\
-             \"args\":{args},\"feedback\":{has_feedback},\"id\":{id}}}"
-        ));
+        let more = format!(
+            "\"action_type\":\"pendularm_interfaces/action/MoveTo\",\"args\":{args},\"feedback\":{has_feedback},\"id\":{id}"
+        );
+        self.send(&frame("send_action_goal", "action", "/ik_action", &more));
         let court = self.court;
         let expect = Expect::Goal { has_feedback };
         self.me()
@@ -101,20 +91,14 @@ impl Workload<'_> {
     pub(super) fn cancel(&mut self, id: &str) {
         // It may have ended meanwhile.
         self.me().mistakes += 1;
-        self.send(&format!(
-            "{{\"op\":\"cancel_action_goal\",\"action\":\"/ik_action\",\"id\":{id}}}"
-        ));
+        let more = format!("\"id\":{id}");
+        self.send(&frame("cancel_action_goal", "action", "/ik_action", &more));
     }
 
     /// Asks for the end of a goal that another client has sent, which must not end it.
     pub fn cancel_anothers(&mut self) {
         let who = self.me().who;
-        let others = self.all.iter().filter(|one| one.who != who);
-        let goals: Vec<String> = others
-            .flat_map(|one| &one.calls)
-            .filter(|(_, call)| matches!(call.expect, Expect::Goal { .. }))
-            .map(|(id, _)| id.clone())
-            .collect();
+        let goals = goals(self.all.iter().filter(|one| one.who != who));
         if !goals.is_empty() {
             let id = self.court.among(&goals);
             self.cancel(&id);
@@ -144,9 +128,16 @@ impl Workload<'_> {
         let topic = self.court.among(&WATCHED);
         if self.me().watched.insert(topic.to_owned()) {
             self.me().await_news(format!("subscribed to {topic}"));
-            return self.send(&format!("{{\"op\":\"subscribe\",\"topic\":\"{topic}\"}}"));
+            return self.send(&frame("subscribe", "topic", topic, ""));
         }
         // Messages on their way may still arrive, so they stay on the list of allowed messages.
-        self.send(&format!("{{\"op\":\"unsubscribe\",\"topic\":\"{topic}\"}}"));
+        self.send(&frame("unsubscribe", "topic", topic, ""));
     }
+}
+
+/// The ids of the goals that these clients have sent.
+fn goals<'a>(clients: impl IntoIterator<Item = &'a Honest>) -> Vec<String> {
+    let calls = clients.into_iter().flat_map(|one| &one.calls);
+    let goals = calls.filter(|(_, call)| matches!(call.expect, Expect::Goal { .. }));
+    goals.map(|(id, _)| id.clone()).collect()
 }

@@ -126,16 +126,13 @@ impl Workload<'_> {
     fn call(&mut self, service: &str, args: &str, expect: Expect, is_light: bool) {
         let id = self.id();
         let spelling = self.spelled(service);
+        let call = |more: String| frame("call_service", "service", &spelling, &more);
         let frame = match self.court.below(3) {
-            0 => format!(
-                "{{\"op\":\"call_service\",\"id\":{id},\"service\":\"{spelling}\",\"args\":{args}}}"
-            ),
+            0 => call(format!("\"args\":{args},\"id\":{id}")),
             1 => format!(
                 "{{ \"args\": {args}, \"service\": \"{spelling}\", \"op\": \"call_service\", \"id\": {id} }}"
             ),
-            _ => format!(
-                "{{\"op\":\"call_service\",\"service\":\"{spelling}\",\"args\":{args},\"id\":{id}}}"
-            ),
+            _ => call(format!("\"id\":{id},\"args\":{args}")),
         };
         self.send(&frame);
         let court = self.court;
@@ -155,21 +152,26 @@ impl Workload<'_> {
     }
 
     fn joints(&self, low: f64, high: f64) -> String {
-        let joints: Vec<f64> = (0..self.plan.links)
-            .map(|_| self.number(low, high))
-            .collect();
-        Value::from(joints).to_string()
+        let joints = (0..self.plan.links).map(|_| self.number(low, high));
+        Value::from(joints.collect::<Vec<f64>>()).to_string()
     }
+}
+
+/// An operation about a name, with further members or none.
+pub fn frame(op: &str, member: &str, name: &str, more: &str) -> String {
+    let more = if more.is_empty() {
+        String::new()
+    } else {
+        format!(",{more}")
+    };
+    format!("{{\"op\":\"{op}\",\"{member}\":\"{name}\"{more}}}")
 }
 
 /// A text with all frames that a client still expects.
 pub fn waits(honest: &Honest) -> String {
     let call = |(id, call): (&String, &Call)| {
-        format!(
-            "{:.80} (id {id}, for {:?})",
-            call.what,
-            call.since.elapsed()
-        )
+        let since = call.since.elapsed();
+        format!("{:.80} (id {id}, for {since:?})", call.what)
     };
     let mut all: Vec<String> = honest.calls.iter().map(call).collect();
     all.extend(honest.news.keys().map(|one| format!("news: {one}")));

@@ -6,8 +6,11 @@ impl Workload<'_> {
     pub(super) fn provide(&mut self) {
         let service = self.court.among(&SERVICES);
         let spelling = self.spelled(service);
-        self.send(&format!(
-            "{{\"op\":\"advertise_service\",\"service\":\"{spelling}\",\"type\":\"x/Y\"}}"
+        self.send(&frame(
+            "advertise_service",
+            "service",
+            &spelling,
+            "\"type\":\"x/Y\"",
         ));
         self.me()
             .await_news(format!("advertised service {spelling}"));
@@ -23,27 +26,15 @@ impl Workload<'_> {
 
     pub(super) fn withdraw(&mut self) {
         let who = self.me().who;
-        let mine: Vec<String> = self
-            .model
-            .services
-            .iter()
-            .filter(|(_, one)| one.provider == Some(who))
-            .map(|(name, _)| name.clone())
-            .collect();
-        if let Some(service) = mine.first() {
+        let mut services = self.model.services.iter();
+        let mine = services.find(|(_, one)| one.provider == Some(who));
+        if let Some(service) = mine.map(|(name, _)| name.clone()) {
             // Another client may have become the provider meanwhile.
             self.me().mistakes += 1;
-            self.send(&format!(
-                "{{\"op\":\"unadvertise_service\",\"service\":\"{service}\"}}"
-            ));
+            self.send(&frame("unadvertise_service", "service", &service, ""));
             let changed = self.court.turns.get();
-            self.model.services.insert(
-                service.clone(),
-                crate::model::Provided {
-                    changed,
-                    ..Default::default()
-                },
-            );
+            let provided = crate::model::Provided::none(changed);
+            self.model.services.insert(service.clone(), provided);
         }
     }
 
@@ -59,9 +50,8 @@ impl Workload<'_> {
             (",\"timeout\":86400", DAY),
         ]);
         let id = self.id();
-        self.send(&format!(
-            "{{\"op\":\"call_service\",\"id\":{id},\"service\":\"{spelling}\"{text},\"args\":{args}}}"
-        ));
+        let more = format!("\"id\":{id}{text},\"args\":{args}");
+        self.send(&frame("call_service", "service", &spelling, &more));
         let forward = Forward {
             service: absolute(service),
             args: args.clone(),
@@ -87,25 +77,19 @@ impl Workload<'_> {
     /// Decides about the calls that this client has received as a provider.
     pub fn answer_calls(&mut self) {
         let who = self.me().who;
-        let asked: Vec<_> = self
-            .model
-            .asked
-            .extract_if(.., |one| one.provider == who)
-            .collect();
+        let asked = &mut self.model.asked;
+        let asked: Vec<_> = asked.extract_if(.., |one| one.provider == who).collect();
         for one in asked {
             let delay = match self.court.below(5) {
                 0 => continue,
                 1 => Duration::from_millis(self.court.below(3000) as u64),
                 _ => Duration::ZERO,
             };
-            let (result, values) = (
-                self.court.chance(0.9),
-                format!("{{\"v\":{}}}", self.payload(1)),
-            );
+            let result = self.court.chance(0.9);
+            let values = format!("{{\"v\":{}}}", self.payload(1));
             let (id, service) = (one.id, one.service);
-            let frame = format!(
-                "{{\"op\":\"service_response\",\"id\":{id},\"service\":\"{service}\",\"values\":{values},\"result\":{result}}}"
-            );
+            let more = format!("\"id\":{id},\"values\":{values},\"result\":{result}");
+            let frame = frame("service_response", "service", &service, &more);
             let due = Instant::now() + delay;
             self.me().due_answers.push((due, one.number, frame));
             if let Some(forward) = self.model.forwards.get_mut(&one.number) {
@@ -113,19 +97,12 @@ impl Workload<'_> {
             }
         }
         let now = Instant::now();
-        let due: Vec<_> = self
-            .me()
-            .due_answers
-            .extract_if(.., |(due, ..)| *due <= now)
-            .collect();
+        let due = &mut self.me().due_answers;
+        let due: Vec<_> = due.extract_if(.., |(due, ..)| *due <= now).collect();
         for (_, number, frame) in due {
             // Its caller may already have received a timeout, or may have disconnected.
-            let is_late = self
-                .model
-                .forwards
-                .get(&number)
-                .is_none_or(|one| one.since + one.timeout <= now);
-            if is_late {
+            let forward = self.model.forwards.get(&number);
+            if forward.is_none_or(|one| one.since + one.timeout <= now) {
                 self.me().mistakes += 1;
             }
             self.send(&frame);

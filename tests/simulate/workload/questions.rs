@@ -30,50 +30,45 @@ impl Workload<'_> {
         let which = self.court.below(9);
         let (service, args) = match which {
             0 => {
-                let method = self.court.among(&Method::ALL);
+                let name = self.court.among(&Method::ALL).name();
                 (
                     "/arm_sim/set_integrator",
-                    format!("{{\"method\":\"{}\"}}", method.name()),
+                    format!("{{\"method\":\"{name}\"}}"),
                 )
             }
             1 => {
-                let step = self
-                    .court
-                    .among(&["0.001", "5e-4", "0.002", "0.004", "1.5e-3"]);
+                let steps = ["0.001", "5e-4", "0.002", "0.004", "1.5e-3"];
+                let step = self.court.among(&steps);
                 (
                     "/arm_sim/set_integrator",
                     format!("{{\"timestep\":{step}}}"),
                 )
             }
-            2 => (
-                "/arm_sim/set_params",
-                format!("{{\"gravity\":{}}}", self.number(0.0, 12.0)),
-            ),
-            3 => (
-                "/arm_sim/pause",
-                format!("{{\"data\":{}}}", self.court.chance(0.4)),
-            ),
-            4 => (
-                "/arm_sim/step",
-                format!("{{\"steps\":{}}}", 1 + self.court.below(300)),
-            ),
+            2 => {
+                let gravity = self.number(0.0, 12.0);
+                ("/arm_sim/set_params", format!("{{\"gravity\":{gravity}}}"))
+            }
+            3 => {
+                let on = self.court.chance(0.4);
+                ("/arm_sim/pause", format!("{{\"data\":{on}}}"))
+            }
+            4 => {
+                let steps = 1 + self.court.below(300);
+                ("/arm_sim/step", format!("{{\"steps\":{steps}}}"))
+            }
             5 => {
                 let (effort, duration) = (self.joints(-20.0, 20.0), self.number(0.01, 0.5));
-                (
-                    "/arm_sim/disturb",
-                    format!("{{\"effort\":{effort},\"duration\":{duration}}}"),
-                )
+                let args = format!("{{\"effort\":{effort},\"duration\":{duration}}}");
+                ("/arm_sim/disturb", args)
             }
-            6 => (
-                "/pid_controller/enable",
-                format!("[{}]", self.court.chance(0.7)),
-            ),
+            6 => {
+                let on = self.court.chance(0.7);
+                ("/pid_controller/enable", format!("[{on}]"))
+            }
             7 => {
                 let (kp, kd) = (self.joints(50.0, 300.0), self.joints(5.0, 20.0));
-                (
-                    "/pid_controller/set_gains",
-                    format!("{{\"kp\":{kp},\"kd\":{kd}}}"),
-                )
+                let args = format!("{{\"kp\":{kp},\"kd\":{kd}}}");
+                ("/pid_controller/set_gains", args)
             }
             _ => ("/arm_sim/reset", "{}".to_owned()),
         };
@@ -87,46 +82,36 @@ impl Workload<'_> {
 
     pub(super) fn setpoint(&mut self) {
         let positions = self.joints(-2.0, 2.0);
-        let frame = format!(
-            "{{\"op\":\"publish\",\"topic\":\"/joint_trajectory\",\"msg\":{{\"points\":[{{\"positions\":{positions}}}]}}}}"
-        );
-        self.send(&frame);
+        let msg = format!("\"msg\":{{\"points\":[{{\"positions\":{positions}}}]}}");
+        self.send(&frame("publish", "topic", "/joint_trajectory", &msg));
     }
 
     pub(super) fn rosapi(&mut self) {
         let (service, args, member) = self.court.among(&[
-            ("/rosapi/get_time", "{}", "time"),
-            ("/rosapi/topics", "{}", "topics"),
-            ("/rosapi/services", "{}", "services"),
-            ("/rosapi/nodes", "{}", "nodes"),
-            ("/rosapi/topic_type", "{\"topic\":\"/clock\"}", "type"),
-            ("/rosapi/get_param", "{\"name\":\"gravity\"}", "value"),
-            (
-                "/rosapi/set_param",
-                "{\"name\":\"gravity\",\"value\":\"9.5\"}",
-                "successful",
-            ),
-            ("/rosapi/get_param_names", "{}", "names"),
-            ("/rosapi/publishers", "{\"topic\":\"/t0\"}", "publishers"),
+            ("get_time", "{}", "time"),
+            ("topics", "{}", "topics"),
+            ("services", "{}", "services"),
+            ("nodes", "{}", "nodes"),
+            ("topic_type", "{\"topic\":\"/clock\"}", "type"),
+            ("get_param", "{\"name\":\"gravity\"}", "value"),
+            ("set_param", "[\"gravity\",\"9.5\"]", "successful"),
+            ("get_param_names", "{}", "names"),
+            ("publishers", "{\"topic\":\"/t0\"}", "publishers"),
         ]);
-        self.call(service, args, Expect::Member(member), true);
+        let service = format!("/rosapi/{service}");
+        self.call(&service, args, Expect::Member(member), true);
     }
 
     pub(super) fn mistake(&mut self) {
-        let call = match self.court.below(5) {
-            0 => Some(("/nobody/serves", "{}", Expect::Refusal)),
-            1 => Some(("/arm_sim/set_params", "{\"gravity\":-1}", Expect::Refusal)),
-            2 => Some(("/ik/solve", "{\"x\":1e9,\"y\":0}", Expect::Refusal)),
-            3 => Some((
-                "/arm_sim/integration_step",
-                "{\"function\":\"sin(\"}",
-                Expect::Refusal,
-            )),
-            _ => None,
-        };
-        if let Some((service, args, expect)) = call {
-            let is_light = service != "/arm_sim/integration_step";
-            return self.call(service, args, expect, is_light);
+        let calls = [
+            ("/nobody/serves", "{}"),
+            ("/arm_sim/set_params", "{\"gravity\":-1}"),
+            ("/ik/solve", "{\"x\":1e9,\"y\":0}"),
+            ("/arm_sim/integration_step", "{\"function\":\"sin(\"}"),
+        ];
+        if let Some((service, args)) = calls.get(self.court.below(5)) {
+            let is_light = *service != "/arm_sim/integration_step";
+            return self.call(service, args, Expect::Refusal, is_light);
         }
         let frame = self.court.among(&[
             "{\"op\":\"no_such_op\"}",
@@ -142,9 +127,8 @@ impl Workload<'_> {
 
     pub(super) fn in_fragments(&mut self) {
         let id = self.id();
-        let frame = format!(
-            "{{\"op\":\"call_service\",\"id\":{id},\"service\":\"/pid_controller/enable\",\"args\":{{}}}}"
-        );
+        let more = format!("\"id\":{id},\"args\":{{}}");
+        let frame = frame("call_service", "service", "/pid_controller/enable", &more);
         let (size, style) = (8 + self.court.below(60), self.style());
         self.court.note("sends in pieces", frame.as_bytes());
         self.me().send_pieces(&frame, size, style);

@@ -2,46 +2,34 @@
 
 use super::*;
 
+/// Numbers and texts that must arrive unchanged.
+const NUMBERS: [&str; 6] = ["0", "-0.0", "1.50", "12345678901234567", "1e5", "-2.5E-3"];
+const TEXTS: [&str; 5] = ["", "a b", "\\u00e9\\n", "\u{e9}\u{1f600}", "}{][,:"];
+
 impl Workload<'_> {
     /// JSON that must arrive unchanged.
     pub(super) fn payload(&self, depth: usize) -> String {
         match self.court.below(if depth > 2 { 6 } else { 9 }) {
             0 => "null".to_owned(),
-            1 => self
-                .court
-                .among(&["0", "-0.0", "1.50", "12345678901234567", "1e5", "-2.5E-3"])
-                .to_owned(),
-            2 => self
-                .court
-                .among(&[
-                    "\"\"",
-                    "\"a b\"",
-                    "\"\\u00e9\\n\"",
-                    "\"\u{e9}\u{1f600}\"",
-                    "\"}{][,:\"",
-                ])
-                .to_owned(),
+            1 => self.court.among(&NUMBERS).to_owned(),
+            2 => format!("\"{}\"", self.court.among(&TEXTS)),
             3 => "true".to_owned(),
-            4 => format!(
-                "\"{}\"",
-                "x".repeat(
-                    self.court
-                        .below(if self.plan.room < 1000 { 60 } else { 3000 })
-                )
-            ),
-            5 => format!(
-                "[{},{},{}]",
-                self.number(-1.0, 1.0),
-                self.number(-1e9, 1e9),
-                self.court.below(9)
-            ),
+            4 => {
+                let most = if self.plan.room < 1000 { 60 } else { 3000 };
+                format!("\"{}\"", "x".repeat(self.court.below(most)))
+            }
+            5 => {
+                let (small, large) = (self.number(-1.0, 1.0), self.number(-1e9, 1e9));
+                format!("[{small},{large},{}]", self.court.below(9))
+            }
             6 => "{}".to_owned(),
-            7 => format!("[{},{}]", self.payload(depth + 1), self.payload(depth + 1)),
-            _ => format!(
-                "{{\"a\":{},\"b c\":{}}}",
-                self.payload(depth + 1),
-                self.payload(depth + 1)
-            ),
+            kind => {
+                let (one, other) = (self.payload(depth + 1), self.payload(depth + 1));
+                match kind {
+                    7 => format!("[{one},{other}]"),
+                    _ => format!("{{\"a\":{one},\"b c\":{other}}}"),
+                }
+            }
         }
     }
 
@@ -55,9 +43,7 @@ impl Workload<'_> {
     pub(super) fn advertise(&mut self, topic: &str) {
         if self.me().advertised.insert(topic.to_owned()) {
             let spelling = self.spelled(topic);
-            self.send(&format!(
-                "{{\"op\":\"advertise\",\"topic\":\"{spelling}\"}}"
-            ));
+            self.send(&frame("advertise", "topic", &spelling, ""));
         }
     }
 
@@ -68,17 +54,13 @@ impl Workload<'_> {
             let (number, more) = (self.numbers.next(), payload(self));
             let body = format!("{{\"from\":{who},\"number\":{number},\"more\":{more}}}");
             let spelling = self.spelled(topic);
-            let frame = match self.court.below(4) {
-                0 => format!(
-                    "{{\"op\":\"publish\",\"id\":\"m{number}\",\"topic\":\"{spelling}\",\"msg\":{body}}}"
-                ),
-                _ => format!("{{\"op\":\"publish\",\"topic\":\"{spelling}\",\"msg\":{body}}}"),
+            let msg = match self.court.below(4) {
+                0 => format!("\"id\":\"m{number}\",\"msg\":{body}"),
+                _ => format!("\"msg\":{body}"),
             };
-            let size = if self.plan.room < 1000 {
-                0
-            } else {
-                self.court.below(20)
-            };
+            let frame = frame("publish", "topic", &spelling, &msg);
+            let is_wide = self.plan.room >= 1000;
+            let size = if is_wide { self.court.below(20) } else { 0 };
             if size == 1 && body.len() > 200 {
                 let style = self.style();
                 self.me().send_pieces(&frame, 150, style);
@@ -100,21 +82,17 @@ impl Workload<'_> {
             let order = self.me().frames;
             self.me().published.insert(number, order);
             self.court.count("messages published");
-            for other in self.all.iter_mut() {
-                for one in other
-                    .subscriptions
-                    .values_mut()
-                    .filter(|one| one.topic == topic)
-                {
-                    let is_on = one.phase == Phase::On && link;
-                    let must = is_on && one.throttle.is_none();
-                    one.pending
-                        .entry(who)
-                        .or_default()
-                        .push_back((number, must));
-                    if is_on {
-                        one.newest.insert(who, number);
-                    }
+            let subscriptions = self
+                .all
+                .iter_mut()
+                .flat_map(|one| one.subscriptions.values_mut());
+            for one in subscriptions.filter(|one| one.topic == topic) {
+                let is_on = one.phase == Phase::On && link;
+                let must = is_on && one.throttle.is_none();
+                let pending = one.pending.entry(who).or_default();
+                pending.push_back((number, must));
+                if is_on {
+                    one.newest.insert(who, number);
                 }
             }
         }
@@ -139,11 +117,9 @@ impl Workload<'_> {
     pub fn flood(&mut self) -> Option<usize> {
         // Hostile clients request pieces on one topic. A thousand pieces of each message would take too much time.
         let subscriptions = self.all.iter().flat_map(|one| one.subscriptions.values());
-        let in_pieces: Vec<&str> = subscriptions
-            .filter(|one| one.is_in_pieces)
-            .map(|one| one.topic.as_str())
-            .chain([TOPICS[1]])
-            .collect();
+        let in_pieces = subscriptions.filter(|one| one.is_in_pieces);
+        let in_pieces = in_pieces.map(|one| one.topic.as_str());
+        let in_pieces: Vec<&str> = in_pieces.chain([TOPICS[1]]).collect();
         let listens = |(place, one): (usize, &Honest)| {
             let mut all = one.subscriptions.values();
             let plain = all.find(|one| {
@@ -181,21 +157,21 @@ impl Workload<'_> {
         if differs {
             return;
         }
-        let mut frame = format!("{{\"op\":\"subscribe\",\"topic\":\"{spelling}\"");
+        let mut more = Vec::new();
         if let Some(interval) = throttle {
-            let queue = self.court.below(4);
-            frame += &format!(
-                ",\"throttle_rate\":{},\"queue_length\":{queue}",
-                interval.as_millis()
-            );
+            more.push(format!("\"throttle_rate\":{}", interval.as_millis()));
+            more.push(format!("\"queue_length\":{}", self.court.below(4)));
         }
         if feature == Feature::Pieces {
-            frame += &format!(",\"fragment_size\":{}", self.court.among(&PIECE_SIZES));
+            more.push(format!(
+                "\"fragment_size\":{}",
+                self.court.among(&PIECE_SIZES)
+            ));
         }
         if is_binary {
-            frame += ",\"compression\":\"cbor\"";
+            more.push("\"compression\":\"cbor\"".to_owned());
         }
-        self.send(&(frame + "}"));
+        self.send(&frame("subscribe", "topic", &spelling, &more.join(",")));
         self.me().await_news(format!("subscribed to {spelling}"));
         if !is_new {
             return;
@@ -222,10 +198,8 @@ impl Workload<'_> {
             let publisher = self.all.iter().find(|one| one.who == message.publisher);
             let order = publisher.and_then(|one| Some((one.published.get(number)?, one.handled)));
             if message.topic == topic && order.is_none_or(|(order, handled)| *order >= handled) {
-                pending
-                    .entry(message.publisher)
-                    .or_default()
-                    .push_back((*number, false));
+                let pending = pending.entry(message.publisher).or_default();
+                pending.push_back((*number, false));
             }
         }
         pending
@@ -237,18 +211,14 @@ impl Workload<'_> {
             return;
         }
         let spelling = self.court.among(&spellings);
-        self.send(&format!(
-            "{{\"op\":\"unsubscribe\",\"topic\":\"{spelling}\"}}"
-        ));
+        self.send(&frame("unsubscribe", "topic", &spelling, ""));
         let order = self.me().frames;
         if let Some(one) = self.me().subscriptions.get_mut(&spelling)
             && !matches!(one.phase, Phase::Leaving(_))
         {
             one.phase = Phase::Leaving(order);
-            one.pending
-                .values_mut()
-                .flatten()
-                .for_each(|(_, must)| *must = false);
+            let pending = one.pending.values_mut().flatten();
+            pending.for_each(|(_, must)| *must = false);
         }
     }
 }

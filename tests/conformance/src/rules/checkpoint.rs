@@ -5,42 +5,88 @@ use serde_json::{Value, json};
 use crate::bench::{Bench, same};
 use crate::method::METHODS;
 use crate::values::{list, near};
-use crate::{Got, REJECTED, Rule, rule};
+use crate::{Check, Got};
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule(
-        "checkpoint-1",
-        "times, positions and velocities have one entry per step and the starting point",
-        "steps + 1 entries each, for every integrator",
-        lengths,
-    ),
-    rule("checkpoint-2", "Index 0 is the starting point", "times[0] = 0, positions[0] = x0, velocities[0] = xdot0", start),
-    rule("checkpoint-3", "xdot0 is 0 if it is left out", "velocities[0] = 0", default_velocity),
-    rule("checkpoint-4", "times advance by dt", "times[k] = k dt", times),
-    rule(
-        "checkpoint-5",
-        "A constant force has the closed form",
-        "x = x0 + v0 t + a t^2 / 2 to 1e-9 by midpoint, verlet and rk4; v = v0 + a t by all",
-        constant_force,
-    ),
-    rule("checkpoint-6", "The service does not read the live arm", "the same answer for another gravity, method and pose", reads_nothing),
-    rule(
-        "checkpoint-7",
-        "The service does not write to the live arm",
-        "the same joint states and settings before and after",
-        writes_nothing,
-    ),
-    rule("checkpoint-8", "An unknown integrator is rejected", REJECTED, |bench| {
-        rejects(bench, &[("integrator", json!("rk5")), ("integrator", json!(""))])
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("checkpoint-1", |bench| {
+        for method in METHODS {
+            for steps in [1, 7] {
+                bench.integrate("sin(t)", [0.0, 0.0, 0.01], steps, method)?;
+            }
+        }
+        Ok("2 and 8 entries".to_owned())
     }),
-    rule("checkpoint-9", "dt = 0 and dt < 0 are rejected", REJECTED, |bench| rejects(bench, &[("dt", json!(0.0)), ("dt", json!(-0.1))])),
-    rule("checkpoint-10", "steps = 0 is rejected", REJECTED, |bench| rejects(bench, &[("steps", json!(0))])),
-    rule("checkpoint-11", "A function that does not parse is rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["2 +", "* t", "sin", "sin()", "t t"])
+    ("checkpoint-2", |bench| {
+        let [times, positions, velocities] = bench.integrate("t", [1.5, -0.75, 0.1], 2, "euler")?;
+        let first: Vec<f64> = [times, positions, velocities].iter().filter_map(|values| values.first().copied()).collect();
+        near("the starting point", &first, &[0.0, 1.5, -0.75], 1e-12)?;
+        Ok(list(&first))
     }),
-    rule("checkpoint-12", "The server answers later calls after rejected ones", "an accepted call after 20 rejected ones", lives_on),
-    rule("function-1", "+ - * / are left-associative and * / bind tighter than + -", "10-4-3 = 3, 16/4/2 = 2, 2+3*4 = 14, ...", |bench| {
+    ("checkpoint-3", |bench| {
+        let mut request = request();
+        if let Some(members) = request.as_object_mut() {
+            members.remove("xdot0");
+        }
+        let values = bench.accepted("/arm_sim/integration_step", &request)?;
+        let first = crate::values::number(&values, "velocities/0")?;
+        near("velocities", &[first], &[0.0], 1e-12)?;
+        Ok(first.to_string())
+    }),
+    ("checkpoint-4", |bench| {
+        let [times, ..] = bench.integrate("0", [0.0, 0.0, 0.05], 40, "rk4")?;
+        let expected: Vec<f64> = (0..=40).map(|k| 0.05 * f64::from(k)).collect();
+        near("times", &times, &expected, 1e-9)?;
+        Ok("0 to 2 s by 0.05 s".to_owned())
+    }),
+    ("checkpoint-5", |bench| {
+        let (x0, v0, a, dt) = (1.0, 2.0, -3.0, 0.125);
+        for method in METHODS {
+            let [_, positions, velocities] = bench.integrate("-3", [x0, v0, dt], 16, method)?;
+            let times: Vec<f64> = (0..=16).map(|k| dt * f64::from(k)).collect();
+            let x: Vec<f64> = times.iter().map(|t| x0 + v0 * t + 0.5 * a * t * t).collect();
+            let v: Vec<f64> = times.iter().map(|t| v0 + a * t).collect();
+            if method != "euler" {
+                near(&format!("positions by {method}"), &positions, &x, 1e-9)?;
+            }
+            near(&format!("velocities by {method}"), &velocities, &v, 1e-9)?;
+        }
+        Ok("the closed form".to_owned())
+    }),
+    ("checkpoint-6", |bench| {
+        let before = bench.integrate("cos(2*t)", [0.1, 0.2, 0.1], 10, "midpoint")?;
+        bench.set_gravity(1.0)?;
+        bench.accepted("/arm_sim/set_integrator", &json!({"method": "euler", "timestep": 0.004}))?;
+        bench.swing()?;
+        let after = bench.integrate("cos(2*t)", [0.1, 0.2, 0.1], 10, "midpoint")?;
+        near("positions", &after[1], &before[1], 1e-15)?;
+        near("velocities", &after[2], &before[2], 1e-15)?;
+        Ok("the same answer".to_owned())
+    }),
+    ("checkpoint-7", |bench| {
+        bench.swing()?;
+        bench.pause(true)?;
+        let before = bench.fresh()?;
+        let settings = bench.accepted("/arm_sim/set_integrator", &json!({}))?;
+        bench.integrate("1000", [5.0, 6.0, 0.1], 10, "verlet")?;
+        let after = bench.fresh()?;
+        near("position", &after.position, &before.position, 1e-12)?;
+        near("velocity", &after.velocity, &before.velocity, 1e-12)?;
+        same(&settings, &bench.accepted("/arm_sim/set_integrator", &json!({}))?, &["method", "timestep"])?;
+        Ok("nothing changed".to_owned())
+    }),
+    ("checkpoint-8", |bench| rejects(bench, &[("integrator", json!("rk5")), ("integrator", json!(""))])),
+    ("checkpoint-9", |bench| rejects(bench, &[("dt", json!(0.0)), ("dt", json!(-0.1))])),
+    ("checkpoint-10", |bench| rejects(bench, &[("steps", json!(0))])),
+    ("checkpoint-11", |bench| rejects_functions(bench, &["2 +", "* t", "sin", "sin()", "t t"])),
+    ("checkpoint-12", |bench| {
+        for _ in 0..5 {
+            rejects(bench, &[("function", json!("((t")), ("integrator", json!("leapfrog")), ("dt", json!(-1)), ("steps", json!(0))])?;
+        }
+        bench.integrate("t", [0.0, 0.0, 0.1], 3, "rk4")?;
+        Ok("an accepted call".to_owned())
+    }),
+    ("function-1", |bench| {
         evaluates(
             bench,
             &[
@@ -55,10 +101,10 @@ pub const RULES: &[Rule] = &[
             ],
         )
     }),
-    rule("function-2", "^ is right-associative and binds tighter than * /", "2^3^2 = 512, 2*3^2 = 18, ...", |bench| {
+    ("function-2", |bench| {
         evaluates(bench, &[("2^3^2", |_| 512.0), ("2*3^2", |_| 18.0), ("12/2^2", |_| 3.0), ("t^3", |t| t.powi(3)), ("2^t", f64::exp2)])
     }),
-    rule("function-3", "Unary minus binds tighter than ^", "-3^2 = 9, 2^-1 = 0.5, ...", |bench| {
+    ("function-3", |bench| {
         evaluates(
             bench,
             &[
@@ -71,16 +117,14 @@ pub const RULES: &[Rule] = &[
             ],
         )
     }),
-    rule("function-4", "Parentheses group", "(1+2)*3 = 9, 2^(1+2) = 8, ...", |bench| {
+    ("function-4", |bench| {
         evaluates(
             bench,
             &[("(1+2)*3", |_| 9.0), ("10-(4-3)", |_| 9.0), ("2^(1+2)", |_| 8.0), ("(2^3)^2", |_| 64.0), ("((t))*(t+1)", |t| t * (t + 1.0))],
         )
     }),
-    rule("function-5", "Numbers may have a fraction", "0.25, 12.5, 3", |bench| {
-        evaluates(bench, &[("0.25", |_| 0.25), ("12.5", |_| 12.5), ("3", |_| 3.0)])
-    }),
-    rule("function-6", "sin cos tan exp sqrt ln abs are known", "their values to 1e-9", |bench| {
+    ("function-5", |bench| evaluates(bench, &[("0.25", |_| 0.25), ("12.5", |_| 12.5), ("3", |_| 3.0)])),
+    ("function-6", |bench| {
         evaluates(
             bench,
             &[
@@ -95,31 +139,20 @@ pub const RULES: &[Rule] = &[
             ],
         )
     }),
-    rule("function-7", "t is the free variable; the specification's examples are valid", "t, sin(t), t^2 + 3*t - 1, -t + 1", |bench| {
+    ("function-7", |bench| {
         evaluates(bench, &[("t", |t| t), ("sin(t)", f64::sin), ("t^2 + 3*t - 1", |t| t * t + 3.0 * t - 1.0), ("-t + 1", |t| 1.0 - t)])
     }),
-    rule("function-8", "An empty function is rejected", REJECTED, |bench| rejects_functions(bench, &["", "  "])),
-    rule("function-9", "Unbalanced parentheses are rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["(t", "t)", "sin(t", "((t)", ")("])
+    ("function-8", |bench| rejects_functions(bench, &["", "  "])),
+    ("function-9", |bench| rejects_functions(bench, &["(t", "t)", "sin(t", "((t)", ")("])),
+    ("function-10", |bench| rejects_functions(bench, &["x", "foo(t)", "tt", "sinus(t)"])),
+    ("function-11", |bench| rejects_functions(bench, &["t + 1 )", "t + 1 garbage", "sin(t) 5"])),
+    ("function-12", |bench| rejects_functions(bench, &["1 2", "t t", "(t)(t)"])),
+    ("function-13", |bench| rejects_functions(bench, &["t $ 2", "t @ 1", "#", "t ? 1"])),
+    ("function-14", |bench| {
+        let answer = bench.peer.call("/arm_sim/integration_step", &with("function", &json!("sqrt(-1)")))?;
+        bench.integrate("t", [0.0, 0.0, 0.1], 3, "rk4")?;
+        Ok(format!("result {}, then an accepted call", answer.result))
     }),
-    rule("function-10", "An unknown identifier is rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["x", "foo(t)", "tt", "sinus(t)"])
-    }),
-    rule("function-11", "Text after a complete expression is rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["t + 1 )", "t + 1 garbage", "sin(t) 5"])
-    }),
-    rule("function-12", "Adjacent tokens without an operator are rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["1 2", "t t", "(t)(t)"])
-    }),
-    rule("function-13", "An unrecognized character is rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["t $ 2", "t @ 1", "#", "t ? 1"])
-    }),
-    rule(
-        "function-14",
-        "A domain error at evaluation does not stop the service",
-        "an answer to sqrt(-1), then an accepted call",
-        domain_error,
-    ),
 ];
 
 fn request() -> Value {
@@ -146,87 +179,6 @@ fn rejects_functions(bench: &mut Bench, functions: &[&str]) -> Got {
     rejects(bench, &members)
 }
 
-fn lengths(bench: &mut Bench) -> Got {
-    for method in METHODS {
-        for steps in [1, 7] {
-            bench.integrate("sin(t)", [0.0, 0.0, 0.01], steps, method)?;
-        }
-    }
-    Ok("2 and 8 entries".to_owned())
-}
-
-fn start(bench: &mut Bench) -> Got {
-    let [times, positions, velocities] = bench.integrate("t", [1.5, -0.75, 0.1], 2, "euler")?;
-    let first: Vec<f64> = [times, positions, velocities].iter().filter_map(|values| values.first().copied()).collect();
-    near("the starting point", &first, &[0.0, 1.5, -0.75], 1e-12)?;
-    Ok(list(&first))
-}
-
-fn default_velocity(bench: &mut Bench) -> Got {
-    let mut request = request();
-    if let Some(members) = request.as_object_mut() {
-        members.remove("xdot0");
-    }
-    let values = bench.accepted("/arm_sim/integration_step", &request)?;
-    let first = crate::values::number(&values, "velocities/0")?;
-    near("velocities", &[first], &[0.0], 1e-12)?;
-    Ok(first.to_string())
-}
-
-fn times(bench: &mut Bench) -> Got {
-    let [times, ..] = bench.integrate("0", [0.0, 0.0, 0.05], 40, "rk4")?;
-    let expected: Vec<f64> = (0..=40).map(|k| 0.05 * f64::from(k)).collect();
-    near("times", &times, &expected, 1e-9)?;
-    Ok("0 to 2 s by 0.05 s".to_owned())
-}
-
-fn constant_force(bench: &mut Bench) -> Got {
-    let (x0, v0, a, dt) = (1.0, 2.0, -3.0, 0.125);
-    for method in METHODS {
-        let [_, positions, velocities] = bench.integrate("-3", [x0, v0, dt], 16, method)?;
-        let times: Vec<f64> = (0..=16).map(|k| dt * f64::from(k)).collect();
-        let x: Vec<f64> = times.iter().map(|t| x0 + v0 * t + 0.5 * a * t * t).collect();
-        let v: Vec<f64> = times.iter().map(|t| v0 + a * t).collect();
-        if method != "euler" {
-            near(&format!("positions by {method}"), &positions, &x, 1e-9)?;
-        }
-        near(&format!("velocities by {method}"), &velocities, &v, 1e-9)?;
-    }
-    Ok("the closed form".to_owned())
-}
-
-fn reads_nothing(bench: &mut Bench) -> Got {
-    let before = bench.integrate("cos(2*t)", [0.1, 0.2, 0.1], 10, "midpoint")?;
-    bench.set_gravity(1.0)?;
-    bench.accepted("/arm_sim/set_integrator", &json!({"method": "euler", "timestep": 0.004}))?;
-    bench.swing()?;
-    let after = bench.integrate("cos(2*t)", [0.1, 0.2, 0.1], 10, "midpoint")?;
-    near("positions", &after[1], &before[1], 1e-15)?;
-    near("velocities", &after[2], &before[2], 1e-15)?;
-    Ok("the same answer".to_owned())
-}
-
-fn writes_nothing(bench: &mut Bench) -> Got {
-    bench.swing()?;
-    bench.pause(true)?;
-    let before = bench.fresh()?;
-    let settings = bench.accepted("/arm_sim/set_integrator", &json!({}))?;
-    bench.integrate("1000", [5.0, 6.0, 0.1], 10, "verlet")?;
-    let after = bench.fresh()?;
-    near("position", &after.position, &before.position, 1e-12)?;
-    near("velocity", &after.velocity, &before.velocity, 1e-12)?;
-    same(&settings, &bench.accepted("/arm_sim/set_integrator", &json!({}))?, &["method", "timestep"])?;
-    Ok("nothing changed".to_owned())
-}
-
-fn lives_on(bench: &mut Bench) -> Got {
-    for _ in 0..5 {
-        rejects(bench, &[("function", json!("((t")), ("integrator", json!("leapfrog")), ("dt", json!(-1)), ("steps", json!(0))])?;
-    }
-    bench.integrate("t", [0.0, 0.0, 0.1], 3, "rk4")?;
-    Ok("an accepted call".to_owned())
-}
-
 /// A function as it is sent, and its value at a time.
 type Expression = (&'static str, fn(f64) -> f64);
 
@@ -242,10 +194,4 @@ fn evaluates(bench: &mut Bench, table: &[Expression]) -> Got {
         near(&format!("{function} at t = 0, 0.5, 1, 1.5"), &got, &expected, 1e-9)?;
     }
     Ok(format!("{} expressions as expected", table.len()))
-}
-
-fn domain_error(bench: &mut Bench) -> Got {
-    let answer = bench.peer.call("/arm_sim/integration_step", &with("function", &json!("sqrt(-1)")))?;
-    bench.integrate("t", [0.0, 0.0, 0.1], 3, "rk4")?;
-    Ok(format!("result {}, then an accepted call", answer.result))
 }

@@ -7,77 +7,214 @@ use serde_json::{Value, json};
 
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY, apply_alone, has, point, same, shifted};
-use crate::values::{boolean, fine, largest, list, must, near, number, numbers_of};
-use crate::{Got, Rule, rule};
+use crate::rules::pid::{SMALL, changes, wound_up};
+use crate::values::{boolean, largest, list, must, near, number, numbers_of};
+use crate::{Check, Got};
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule("set_integrator-1", "Each method is accepted and read back", "the four names", methods),
-    rule("set_integrator-2", "method and timestep are optional and apply alone", "the other one stays", fields_alone),
-    rule("set_integrator-3", "An empty request changes nothing", "the same values twice", |bench| {
-        is_query(bench, SET_INTEGRATOR, &["method", "timestep"])
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("set_integrator-1", |bench| {
+        for method in crate::method::METHODS {
+            bench.accepted(SET_INTEGRATOR, &json!({"method": method, "timestep": 0.002}))?;
+            let values = bench.accepted(SET_INTEGRATOR, &json!({}))?;
+            has(&json!({"method": method, "timestep": 0.002}), &values)?;
+        }
+        Ok("all four".to_owned())
     }),
-    rule("set_integrator-4", "An unknown method is rejected", "result false, a status, and the method as before", |bench| {
-        rejects_and_keeps(bench, SET_INTEGRATOR, &json!({"method": "leapfrog"}), &json!({"method": "rk4"}))
+    ("set_integrator-2", |bench| {
+        let before = json!({"method": "rk4", "timestep": 0.001});
+        apply_alone(bench, SET_INTEGRATOR, before, &[("method", json!("verlet")), ("timestep", json!(0.003))])
     }),
-    rule("set_integrator-5", "A timestep of 0 or less is rejected", "result false, a status, and the timestep as before", |bench| {
+    ("set_integrator-3", |bench| is_query(bench, SET_INTEGRATOR, &["method", "timestep"])),
+    ("set_integrator-4", |bench| rejects_and_keeps(bench, SET_INTEGRATOR, &json!({"method": "leapfrog"}), &json!({"method": "rk4"}))),
+    ("set_integrator-5", |bench| {
         rejects_and_keeps(bench, SET_INTEGRATOR, &json!({"timestep": 0}), &json!({"timestep": 0.001}))?;
         rejects_and_keeps(bench, SET_INTEGRATOR, &json!({"timestep": -0.001}), &json!({"timestep": 0.001}))
     }),
-    rule("set_integrator-6", "The live arm steps by euler", "its states are those of euler at 0.01 s", |bench| steps_by(bench, "euler")),
-    rule("set_integrator-7", "The live arm steps by midpoint", "its states are those of midpoint at 0.01 s", |bench| {
-        steps_by(bench, "midpoint")
+    ("set_integrator-6", |bench| steps_by(bench, "euler")),
+    ("set_integrator-7", |bench| steps_by(bench, "midpoint")),
+    ("set_integrator-8", |bench| steps_by(bench, "verlet")),
+    ("set_integrator-9", |bench| steps_by(bench, "rk4")),
+    ("set_params-1", |bench| {
+        let values = bench.found()?.setting(SET_PARAMS)?;
+        let gravity = number(&values, "gravity")?;
+        near("gravity", &[gravity], &[GRAVITY], 1e-9)?;
+        Ok(gravity.to_string())
     }),
-    rule("set_integrator-8", "The live arm steps by verlet", "its states are those of verlet at 0.01 s", |bench| steps_by(bench, "verlet")),
-    rule("set_integrator-9", "The live arm steps by rk4", "its states are those of rk4 at 0.01 s", |bench| steps_by(bench, "rk4")),
-    rule("set_params-1", "Gravity is 9.81 at the start", "9.81", default_gravity),
-    rule(
-        "set_params-2",
-        "An empty request returns gravity, masses and lengths and changes nothing",
-        "one positive mass and length per link, the same values twice",
-        query_params,
-    ),
-    rule("set_params-3", "Each field is optional and applies alone", "the other fields stay", params_alone),
-    rule(
-        "set_params-4",
-        "masses or lengths of the wrong length are rejected, valid fields apply",
-        "result false, old arrays, new gravity",
-        wrong_length,
-    ),
-    rule(
-        "set_params-5",
-        "A mass or length of 0 or less is rejected, valid fields apply",
-        "result false, old arrays, new gravity",
-        not_positive,
-    ),
-    rule("set_params-6", "Negative gravity is rejected, valid fields apply", "result false, old gravity, new masses", negative_gravity),
-    rule("set_params-7", "A rejected request returns the current parameters", "gravity, masses and lengths as they are", rejected_echo),
-    rule("set_params-8", "The live arm has the new parameters", "its states are those of the new arm", live_params),
-    rule("set_params-9", "Gravity 0 is accepted and the arm stays at rest", "no motion in 0.4 s with the controller off", no_gravity),
-    rule("pause-1", "/joint_states is published with a frozen state while paused", "messages with one and the same state", frozen),
-    rule("pause-2", "Other services work while paused", "accepted calls", works_while_paused),
-    rule("pause-3", "The simulation continues from the frozen state", "states that follow from it in whole steps", continues),
-    rule("pause-4", "An empty request returns the state and changes nothing", "data true when paused, false when not", query_pause),
-    rule("pause-5", "The integral does not advance while paused", "the same effort after a pause of 1 s", integral_waits),
-    rule(
-        "reset-1",
-        "The arm returns to one fixed pose, which the answer has",
-        "the same position and velocity from different states",
-        fixed_pose,
-    ),
-    rule("reset-2", "/joint_states shows that pose", "the position of the answer", shows_pose),
-    rule("reset-3", "The setpoint is reset too", "no effort and no motion after it", resets_setpoint),
-    rule("reset-4", "The integral is reset too", "no effort after it", resets_integral),
-    rule("reset-5", "The simulation clock starts at zero", "a stamp below 1 s, or wall time in the stamps", zero_clock),
-    rule("reset-6", "A reset keeps every setting", "method, timestep, parameters, gains, pause and enable as before", keeps_settings),
+    ("set_params-2", |bench| {
+        let arm = bench.arm()?;
+        let is_positive = arm.masses.iter().chain(&arm.lengths).all(|value| *value > 0.0);
+        must(is_positive, || format!("masses {}, lengths {}", list(&arm.masses), list(&arm.lengths)))?;
+        is_query(bench, SET_PARAMS, &PARAMS)
+    }),
+    ("set_params-3", |bench| {
+        let before = json!({"gravity": 9.81, "masses": bench.each(1.0), "lengths": bench.each(1.0)});
+        let changes = [("gravity", json!(5.0)), ("masses", json!(bench.each(1.5))), ("lengths", json!(bench.each(0.75)))];
+        apply_alone(bench, SET_PARAMS, before, &changes)
+    }),
+    ("set_params-4", |bench| {
+        let long = vec![1.0; bench.links + 1];
+        rejects_arrays(bench, [&[2.0], &long])
+    }),
+    ("set_params-5", |bench| {
+        let [mut zero, mut negative] = [bench.each(1.0), bench.each(1.0)];
+        zero.splice(..1, [0.0]);
+        negative.splice(..1, [-1.0]);
+        rejects_arrays(bench, [&zero, &negative])
+    }),
+    ("set_params-6", |bench| {
+        let request = json!({"gravity": -9.81, "masses": bench.each(2.0)});
+        let expected = json!({"gravity": 9.81, "masses": bench.each(2.0), "lengths": bench.each(1.0)});
+        rejects_and_keeps(bench, SET_PARAMS, &request, &expected)
+    }),
+    ("set_params-7", |bench| {
+        let answer = bench.rejected(SET_PARAMS, &json!({"gravity": -1.0, "lengths": bench.each(0.5)}))?;
+        let expected = json!({"gravity": 9.81, "masses": bench.each(1.0), "lengths": bench.each(0.5)});
+        has(&expected, &answer.values)?;
+        Ok(answer.values.to_string())
+    }),
+    ("set_params-8", |bench| {
+        let arm = uneven(bench.links);
+        bench.set_arm(&arm)?;
+        bench.swing()?;
+        bench.accepted(SET_INTEGRATOR, &json!({"timestep": 0.005}))?;
+        let steps = bench.follows(&arm, "rk4", 0.005)?;
+        Ok(format!("{steps} steps of that arm"))
+    }),
+    ("set_params-9", |bench| {
+        bench.set_gravity(0.0)?;
+        let pose = bench.reset()?;
+        bench.stays_at(&pose, 0.4, 1e-9)
+    }),
+    ("pause-1", |bench| {
+        bench.swing()?;
+        bench.pause(true)?;
+        let states = bench.joints_for(0.4)?;
+        let first = states.first().ok_or("no joint states")?;
+        must(largest(&first.velocity) > 0.0, || "the arm was at rest before".to_owned())?;
+        for joints in &states {
+            near("position", &joints.position, &first.position, 1e-12)?;
+            near("velocity", &joints.velocity, &first.velocity, 1e-12)?;
+        }
+        Ok(format!("{} messages with one state", states.len()))
+    }),
+    ("pause-2", |bench| {
+        bench.pause(true)?;
+        bench.accepted(SET_PARAMS, &json!({"gravity": 3.0}))?;
+        bench.accepted(SET_INTEGRATOR, &json!({"timestep": 0.002}))?;
+        bench.set_gains(1.0, 0.0, 0.0)?;
+        bench.enable(true)?;
+        bench.integrate("t", [0.0, 0.0, 0.1], 2, "rk4")?;
+        bench.accepted("/ik/solve", &json!({"x": 1.0, "y": 0.5}))?;
+        bench.reset()?;
+        Ok("7 accepted calls".to_owned())
+    }),
+    ("pause-3", |bench| {
+        bench.swing()?;
+        bench.accepted(SET_INTEGRATOR, &json!({"timestep": 0.005}))?;
+        bench.pause(true)?;
+        let frozen = bench.fresh()?;
+        sleep(Duration::from_millis(700));
+        let resumed = Instant::now();
+        bench.pause(false)?;
+        let after = bench.fresh()?;
+        // The arm can only have moved while it was running again, with some tolerance for its clock.
+        let limit = (resumed.elapsed().as_secs_f64() + 0.2) / 0.005;
+        let arm = Arm::of(bench.links, GRAVITY);
+        let (mut own, mut steps) = (frozen.state(), 0);
+        while f64::from(steps) < limit {
+            if near("position", &after.position, &own.position, 1e-6).is_ok() {
+                must(steps > 0, || "the arm does not move again".to_owned())?;
+                return Ok(format!("{steps} steps after the frozen state"));
+            }
+            own = crate::method::step("rk4", &own, 0.0, 0.005, |_, q, v| arm.free_acceleration(q, v));
+            steps += 1;
+        }
+        Err(format!("{} does not follow from {} in {limit:.0} steps", list(&after.position), list(&frozen.position)))
+    }),
+    ("pause-4", |bench| is_switched(bench, "/arm_sim/pause")),
+    ("pause-5", |bench| {
+        wound_up(bench, 500)?;
+        bench.pause(true)?;
+        let before = bench.fresh()?.effort;
+        sleep(Duration::from_secs(1));
+        bench.pause(false)?;
+        let after = bench.fresh()?.effort;
+        changes(&before, &after, |before, after| before > 0.0 && after < 1.7 * before)
+    }),
+    ("reset-1", |bench| {
+        let mut answers = Vec::new();
+        for milliseconds in [0, 300] {
+            bench.swing()?;
+            sleep(Duration::from_millis(milliseconds));
+            let values = bench.accepted("/arm_sim/reset", &json!({}))?;
+            answers.push((numbers_of(&values, "position", bench.links)?, numbers_of(&values, "velocity", bench.links)?));
+        }
+        let [(first, rate), (second, other)] = answers.as_slice() else {
+            return Err("no answers".to_owned());
+        };
+        near("position", second, first, 1e-12)?;
+        near("velocity", other, rate, 1e-12)?;
+        Ok(list(first))
+    }),
+    ("reset-2", |bench| {
+        bench.swing()?;
+        bench.pause(true)?;
+        let pose = bench.reset()?;
+        let joints = bench.fresh()?;
+        near("position", &joints.position, &pose, 1e-9)?;
+        Ok(list(&joints.position))
+    }),
+    ("reset-3", |bench| {
+        let pose = bench.float(0.5, 0.0, 0.5)?;
+        bench.command(&json!([point(&shifted(&pose, 1.0), &bench.each(0.5))]))?;
+        sleep(Duration::from_millis(300));
+        bench.reset()?;
+        bench.stays_at(&pose, 0.2, 1e-6)
+    }),
+    ("reset-4", |bench| {
+        let before = wound_up(bench, 700)?;
+        bench.reset()?;
+        let after = bench.fresh()?.effort;
+        changes(&before, &after, |_, after| after.abs() < 0.01 * SMALL)
+    }),
+    ("reset-5", |bench| {
+        sleep(Duration::from_millis(1200));
+        bench.reset()?;
+        let stamp = bench.fresh()?.stamp;
+        // Wall time counts from 1970.
+        must(!(1.0..1e9).contains(&stamp), || format!("{stamp} s"))?;
+        Ok(format!("{stamp:.3} s"))
+    }),
+    ("reset-6", |bench| {
+        bench.accepted(SET_INTEGRATOR, &json!({"method": "verlet", "timestep": 0.002}))?;
+        bench.set_arm(&uneven(bench.links))?;
+        bench.set_gains(4.0, 3.0, 2.0)?;
+        bench.enable(true)?;
+        bench.pause(true)?;
+        let services: [(&str, &[&str]); 5] = [
+            (SET_INTEGRATOR, &["method", "timestep"]),
+            (SET_PARAMS, &PARAMS),
+            ("/pid_controller/set_gains", &["kp", "ki", "kd"]),
+            ("/pid_controller/enable", &["data"]),
+            ("/arm_sim/pause", &["data"]),
+        ];
+        let mut before = Vec::new();
+        for (service, _) in services {
+            before.push(bench.accepted(service, &json!({}))?);
+        }
+        bench.reset()?;
+        for ((service, members), before) in services.into_iter().zip(&before) {
+            let after = bench.accepted(service, &json!({}))?;
+            same(before, &after, members).map_err(|why| format!("{service}: {why}"))?;
+        }
+        Ok("all as before".to_owned())
+    }),
 ];
 
 const SET_INTEGRATOR: &str = "/arm_sim/set_integrator";
 const SET_PARAMS: &str = "/arm_sim/set_params";
 const PARAMS: [&str; 3] = ["gravity", "masses", "lengths"];
-
-/// An integral gain so small that the arm hardly moves while the error is 1 rad.
-const SMALL: f64 = 0.005;
 
 /// Passes if `{}` is accepted twice and returns the same values.
 pub(crate) fn is_query(bench: &mut Bench, service: &str, members: &[&str]) -> Got {
@@ -85,20 +222,6 @@ pub(crate) fn is_query(bench: &mut Bench, service: &str, members: &[&str]) -> Go
     let after = bench.accepted(service, &json!({}))?;
     same(&before, &after, members)?;
     Ok(after.to_string())
-}
-
-fn methods(bench: &mut Bench) -> Got {
-    for method in crate::method::METHODS {
-        bench.accepted(SET_INTEGRATOR, &json!({"method": method, "timestep": 0.002}))?;
-        let values = bench.accepted(SET_INTEGRATOR, &json!({}))?;
-        has(&json!({"method": method, "timestep": 0.002}), &values)?;
-    }
-    Ok("all four".to_owned())
-}
-
-fn fields_alone(bench: &mut Bench) -> Got {
-    let before = json!({"method": "rk4", "timestep": 0.001});
-    apply_alone(bench, SET_INTEGRATOR, before, &[("method", json!("verlet")), ("timestep", json!(0.003))])
 }
 
 /// Passes if the request is rejected, and the service then returns the members of `expected`.
@@ -117,26 +240,6 @@ fn steps_by(bench: &mut Bench, method: &str) -> Got {
     Ok(format!("{steps} steps of {method}"))
 }
 
-fn default_gravity(bench: &mut Bench) -> Got {
-    let values = bench.found()?.params.clone()?;
-    let gravity = number(&values, "gravity")?;
-    near("gravity", &[gravity], &[GRAVITY], 1e-9)?;
-    Ok(gravity.to_string())
-}
-
-fn query_params(bench: &mut Bench) -> Got {
-    let arm = bench.arm()?;
-    let is_positive = arm.masses.iter().chain(&arm.lengths).all(|value| *value > 0.0);
-    must(is_positive, || format!("masses {}, lengths {}", list(&arm.masses), list(&arm.lengths)))?;
-    is_query(bench, SET_PARAMS, &PARAMS)
-}
-
-fn params_alone(bench: &mut Bench) -> Got {
-    let before = json!({"gravity": 9.81, "masses": bench.each(1.0), "lengths": bench.each(1.0)});
-    let changes = [("gravity", json!(5.0)), ("masses", json!(bench.each(1.5))), ("lengths", json!(bench.each(0.75)))];
-    apply_alone(bench, SET_PARAMS, before, &changes)
-}
-
 /// Passes if each array in place of masses or lengths is rejected, and the gravity beside it is applied.
 fn rejects_arrays(bench: &mut Bench, arrays: [&[f64]; 2]) -> Got {
     let mut status = String::new();
@@ -148,208 +251,20 @@ fn rejects_arrays(bench: &mut Bench, arrays: [&[f64]; 2]) -> Got {
     Ok(status)
 }
 
-fn wrong_length(bench: &mut Bench) -> Got {
-    let long = vec![1.0; bench.links + 1];
-    rejects_arrays(bench, [&[2.0], &long])
-}
-
-fn not_positive(bench: &mut Bench) -> Got {
-    let [mut zero, mut negative] = [bench.each(1.0), bench.each(1.0)];
-    zero.splice(..1, [0.0]);
-    negative.splice(..1, [-1.0]);
-    rejects_arrays(bench, [&zero, &negative])
-}
-
-fn negative_gravity(bench: &mut Bench) -> Got {
-    let request = json!({"gravity": -9.81, "masses": bench.each(2.0)});
-    let expected = json!({"gravity": 9.81, "masses": bench.each(2.0), "lengths": bench.each(1.0)});
-    rejects_and_keeps(bench, SET_PARAMS, &request, &expected)
-}
-
-fn rejected_echo(bench: &mut Bench) -> Got {
-    let answer = bench.rejected(SET_PARAMS, &json!({"gravity": -1.0, "lengths": bench.each(0.5)}))?;
-    let expected = json!({"gravity": 9.81, "masses": bench.each(1.0), "lengths": bench.each(0.5)});
-    has(&expected, &answer.values)?;
-    Ok(answer.values.to_string())
-}
-
 /// An arm whose links are all different.
 pub(crate) fn uneven(links: usize) -> Arm {
     let take = |values: [f64; 3]| values.into_iter().take(links).collect();
     Arm { masses: take([1.4, 0.9, 0.6]), lengths: take([0.8, 1.1, 0.7]), gravity: 6.5 }
 }
 
-fn live_params(bench: &mut Bench) -> Got {
-    let arm = uneven(bench.links);
-    bench.set_arm(&arm)?;
-    bench.swing()?;
-    bench.accepted(SET_INTEGRATOR, &json!({"timestep": 0.005}))?;
-    let steps = bench.follows(&arm, "rk4", 0.005)?;
-    Ok(format!("{steps} steps of that arm"))
-}
-
-fn no_gravity(bench: &mut Bench) -> Got {
-    bench.set_gravity(0.0)?;
-    let pose = bench.reset()?;
-    for joints in bench.joints_for(0.4)? {
-        near("position", &joints.position, &pose, 1e-9)?;
-    }
-    Ok("at rest".to_owned())
-}
-
-fn frozen(bench: &mut Bench) -> Got {
-    bench.swing()?;
-    bench.pause(true)?;
-    let states = bench.joints_for(0.4)?;
-    let first = states.first().ok_or("no joint states")?;
-    must(largest(&first.velocity) > 0.0, || "the arm was at rest before".to_owned())?;
-    for joints in &states {
-        near("position", &joints.position, &first.position, 1e-12)?;
-        near("velocity", &joints.velocity, &first.velocity, 1e-12)?;
-    }
-    Ok(format!("{} messages with one state", states.len()))
-}
-
-fn works_while_paused(bench: &mut Bench) -> Got {
-    bench.pause(true)?;
-    bench.accepted(SET_PARAMS, &json!({"gravity": 3.0}))?;
-    bench.accepted(SET_INTEGRATOR, &json!({"timestep": 0.002}))?;
-    bench.set_gains(1.0, 0.0, 0.0)?;
-    bench.enable(true)?;
-    bench.integrate("t", [0.0, 0.0, 0.1], 2, "rk4")?;
-    bench.accepted("/ik/solve", &json!({"x": 1.0, "y": 0.5}))?;
-    bench.reset()?;
-    Ok("7 accepted calls".to_owned())
-}
-
-fn continues(bench: &mut Bench) -> Got {
-    bench.swing()?;
-    bench.accepted(SET_INTEGRATOR, &json!({"timestep": 0.005}))?;
-    bench.pause(true)?;
-    let frozen = bench.fresh()?;
-    sleep(Duration::from_millis(700));
-    let resumed = Instant::now();
-    bench.pause(false)?;
-    let after = bench.fresh()?;
-    // The arm can only have moved while it was running again, with some tolerance for its clock.
-    let limit = (resumed.elapsed().as_secs_f64() + 0.2) / 0.005;
-    let arm = Arm::of(bench.links, GRAVITY);
-    let (mut own, mut steps) = (frozen.state(), 0);
-    while f64::from(steps) < limit {
-        if near("position", &after.position, &own.position, 1e-6).is_ok() {
-            must(steps > 0, || "the arm does not move again".to_owned())?;
-            return Ok(format!("{steps} steps after the frozen state"));
-        }
-        own = crate::method::step("rk4", &own, 0.0, 0.005, |_, q, v| arm.free_acceleration(q, v));
-        steps += 1;
-    }
-    Err(format!("{} does not follow from {} in {limit:.0} steps", list(&after.position), list(&frozen.position)))
-}
-
-fn query_pause(bench: &mut Bench) -> Got {
-    for paused in [true, false] {
-        bench.pause(paused)?;
+/// Passes if a service of one switch returns it as it was set, also twice.
+pub(crate) fn is_switched(bench: &mut Bench, service: &str) -> Got {
+    for on in [true, false] {
+        bench.accepted(service, &json!({"data": on}))?;
         for _ in 0..2 {
-            let data = boolean(&bench.accepted("/arm_sim/pause", &json!({}))?, "data")?;
-            must(data == paused, || format!("data {data} after data {paused}"))?;
+            let data = boolean(&bench.accepted(service, &json!({}))?, "data")?;
+            must(data == on, || format!("data {data} after data {on}"))?;
         }
     }
     Ok("data as it was set".to_owned())
-}
-
-fn integral_waits(bench: &mut Bench) -> Got {
-    let pose = bench.float(0.0, SMALL, 0.0)?;
-    bench.hold(&shifted(&pose, 1.0))?;
-    sleep(Duration::from_millis(500));
-    bench.pause(true)?;
-    let before = bench.fresh()?.effort;
-    sleep(Duration::from_secs(1));
-    bench.pause(false)?;
-    let after = bench.fresh()?.effort;
-    let grew = before.iter().zip(&after).all(|(before, after)| *before > 0.0 && *after < 1.7 * before);
-    must(grew, || format!("{} before, {} after", fine(&before), fine(&after)))?;
-    Ok(format!("{} before, {} after", fine(&before), fine(&after)))
-}
-
-fn fixed_pose(bench: &mut Bench) -> Got {
-    let mut answers = Vec::new();
-    for milliseconds in [0, 300] {
-        bench.swing()?;
-        sleep(Duration::from_millis(milliseconds));
-        let values = bench.accepted("/arm_sim/reset", &json!({}))?;
-        answers.push((numbers_of(&values, "position", bench.links)?, numbers_of(&values, "velocity", bench.links)?));
-    }
-    if let [(first, rate), (second, other)] = answers.as_slice() {
-        near("position", second, first, 1e-12)?;
-        near("velocity", other, rate, 1e-12)?;
-        return Ok(list(first));
-    }
-    Err("no answers".to_owned())
-}
-
-fn shows_pose(bench: &mut Bench) -> Got {
-    bench.swing()?;
-    bench.pause(true)?;
-    let pose = bench.reset()?;
-    let joints = bench.fresh()?;
-    near("position", &joints.position, &pose, 1e-9)?;
-    Ok(list(&joints.position))
-}
-
-fn resets_setpoint(bench: &mut Bench) -> Got {
-    let pose = bench.float(0.5, 0.0, 0.5)?;
-    bench.command(&json!([point(&shifted(&pose, 1.0), &bench.each(0.5))]))?;
-    sleep(Duration::from_millis(300));
-    bench.reset()?;
-    for joints in bench.joints_for(0.2)? {
-        near("effort", &joints.effort, &bench.each(0.0), 1e-6)?;
-        near("position", &joints.position, &pose, 1e-6)?;
-    }
-    Ok("no effort".to_owned())
-}
-
-fn resets_integral(bench: &mut Bench) -> Got {
-    let pose = bench.float(0.0, SMALL, 0.0)?;
-    bench.hold(&shifted(&pose, 1.0))?;
-    sleep(Duration::from_millis(700));
-    let before = bench.fresh()?.effort;
-    must(before.iter().all(|effort| *effort > 0.2 * SMALL), || format!("the integral does not grow: effort {}", fine(&before)))?;
-    bench.reset()?;
-    let after = bench.fresh()?.effort;
-    must(largest(&after) < 0.01 * SMALL, || format!("effort {} after {}", fine(&after), fine(&before)))?;
-    Ok(format!("effort {} after {}", fine(&after), fine(&before)))
-}
-
-fn zero_clock(bench: &mut Bench) -> Got {
-    sleep(Duration::from_millis(1200));
-    bench.reset()?;
-    let stamp = bench.fresh()?.stamp;
-    // Wall time counts from 1970.
-    must(!(1.0..1e9).contains(&stamp), || format!("{stamp} s"))?;
-    Ok(format!("{stamp:.3} s"))
-}
-
-fn keeps_settings(bench: &mut Bench) -> Got {
-    bench.accepted(SET_INTEGRATOR, &json!({"method": "verlet", "timestep": 0.002}))?;
-    bench.set_arm(&uneven(bench.links))?;
-    bench.set_gains(4.0, 3.0, 2.0)?;
-    bench.enable(true)?;
-    bench.pause(true)?;
-    let services: [(&str, &[&str]); 5] = [
-        (SET_INTEGRATOR, &["method", "timestep"]),
-        (SET_PARAMS, &PARAMS),
-        ("/pid_controller/set_gains", &["kp", "ki", "kd"]),
-        ("/pid_controller/enable", &["data"]),
-        ("/arm_sim/pause", &["data"]),
-    ];
-    let mut before = Vec::new();
-    for (service, _) in services {
-        before.push(bench.accepted(service, &json!({}))?);
-    }
-    bench.reset()?;
-    for ((service, members), before) in services.into_iter().zip(&before) {
-        let after = bench.accepted(service, &json!({}))?;
-        same(before, &after, members).map_err(|why| format!("{service}: {why}"))?;
-    }
-    Ok("all as before".to_owned())
 }

@@ -7,48 +7,107 @@ use serde_json::json;
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY, Joints, shifted};
 use crate::rules::control_services::uneven;
+use crate::rules::pid::held;
 use crate::values::{largest, list, minus, must, numbers_of};
-use crate::{Got, Rule, rule};
+use crate::{Check, Got};
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule("dynamics-1", "With the controller off the arm moves from the starting pose", "motion, unless the pose is an equilibrium", falls),
-    rule("dynamics-2", "At a held setpoint the effort is the gravity load", "effort = G(q) to 2 % in two poses", holds_gravity),
-    rule("dynamics-3", "The gravity load follows from masses, lengths and gravity", "effort = G(q) to 2 % for an uneven arm", holds_uneven),
-    rule("dynamics-4", "One joint's effort moves the others", "motion of every joint that has no effort", couples),
-    rule("dynamics-5", "A free arm keeps its energy by rk4 at 1 ms", "kinetic plus potential energy constant to 0.1 %", keeps_energy),
-    rule("dynamics-6", "Without gravity a free arm keeps its angular momentum about the base", "constant to 0.1 %", keeps_momentum),
-    rule(
-        "dynamics-7",
-        "Without gravity the motion of one joint changes the others' rates",
-        "each rate changes by more than 2 %",
-        rates_change,
-    ),
-    rule(
-        "dynamics-8",
-        "A timestep that is too large makes the controlled arm diverge",
-        "a rate above 1e4 rad/s or one that is not finite, within 5 s",
-        diverges,
-    ),
-    rule("dynamics-9", "A reset brings the arm back after that", "the starting pose, and accepted calls", comes_back),
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("dynamics-1", |bench| {
+        let arm = bench.arm()?;
+        let pose = bench.reset()?;
+        let load = largest(&arm.gravity_load(&pose));
+        let joints = bench.joints_for(0.3)?.pop().ok_or("no joint states")?;
+        let moved = largest(&minus(&joints.position, &pose));
+        must(moved > 0.01 || load < 1e-9, || format!("moved {moved:.6} rad under a gravity load of {load:.2} N m"))?;
+        Ok(format!("moved {moved:.3} rad"))
+    }),
+    ("dynamics-2", |bench| {
+        let arm = Arm::of(bench.links, GRAVITY);
+        holds(bench, &arm, [-0.6, 0.9, -0.5])?;
+        holds(bench, &arm, [0.4, 0.3, 0.6])
+    }),
+    ("dynamics-3", |bench| {
+        let arm = uneven(bench.links);
+        bench.set_arm(&arm)?;
+        holds(bench, &arm, [0.4, -1.0, 0.7])
+    }),
+    ("dynamics-4", |bench| {
+        let pose = bench.float(0.0, 0.0, 0.0)?;
+        let mut kp = bench.each(0.0);
+        if let Some(first) = kp.first_mut() {
+            *first = 5.0;
+        }
+        bench.accepted("/pid_controller/set_gains", &json!({"kp": kp}))?;
+        bench.hold(&shifted(&pose, 1.0))?;
+        let Joints { velocity, effort, .. } = bench.joints_for(0.3)?.pop().ok_or("no joint states")?;
+        let others = velocity.iter().zip(&effort).skip(1);
+        for (rate, effort) in others {
+            must(*effort == 0.0 && rate.abs() > 0.05, || format!("rates {}, efforts {}", list(&velocity), list(&[*effort])))?;
+        }
+        Ok(format!("rates {}", list(&velocity)))
+    }),
+    ("dynamics-5", |bench| {
+        let arm = uneven(bench.links);
+        bench.set_arm(&arm)?;
+        bench.swing()?;
+        let states: Vec<_> = bench.joints_for(0.8)?.iter().map(Joints::state).collect();
+        let kinetic: Vec<f64> = states.iter().map(|state| arm.kinetic(state)).collect();
+        let total: Vec<f64> = states.iter().zip(&kinetic).map(|(state, kinetic)| kinetic + arm.potential(&state.position)).collect();
+        let exchanged = deviation(&kinetic, 1.0);
+        must(exchanged > 0.1, || format!("kinetic energy changes by {exchanged:.4} J alone"))?;
+        let error = deviation(&total, exchanged);
+        must(error < 1e-3, || format!("energy changes by {:.3} % of the {exchanged:.2} J exchanged", 100.0 * error))?;
+        Ok(format!("constant to {error:.1e} while {exchanged:.2} J are exchanged"))
+    }),
+    ("dynamics-6", |bench| {
+        let mut arm = uneven(bench.links);
+        arm.gravity = 0.0;
+        bench.set_arm(&arm)?;
+        bench.swing()?;
+        let momenta: Vec<f64> = bench.joints_for(0.8)?.iter().map(|joints| arm.momentum(&joints.state())).collect();
+        let size = largest(&momenta);
+        must(size > 0.1, || format!("an angular momentum of {size:.4} alone"))?;
+        let error = deviation(&momenta, size);
+        must(error < 1e-3, || format!("it changes by {:.3} % of {size:.3} kg m^2/s", 100.0 * error))?;
+        Ok(format!("{size:.3} kg m^2/s, constant to {error:.1e}"))
+    }),
+    ("dynamics-7", |bench| {
+        bench.set_gravity(0.0)?;
+        bench.swing()?;
+        let states = bench.joints_for(0.6)?;
+        let size = states.iter().map(|joints| largest(&joints.velocity)).fold(0.0, f64::max);
+        let mut changes = Vec::new();
+        for joint in 0..bench.links {
+            let rates: Vec<f64> = states.iter().filter_map(|joints| joints.velocity.get(joint).copied()).collect();
+            changes.push(deviation(&rates, size));
+        }
+        must(changes.iter().all(|change| *change > 0.02), || format!("relative changes {}", list(&changes)))?;
+        Ok(format!("relative changes {}", list(&changes)))
+    }),
+    ("dynamics-8", |bench| {
+        let got = diverged(bench);
+        calm(bench)?;
+        bench.reset()?;
+        got
+    }),
+    ("dynamics-9", |bench| {
+        let pose = bench.reset()?;
+        let how = diverged(bench)?;
+        calm(bench)?;
+        bench.pause(true)?;
+        bench.reset()?;
+        bench.forget("/joint_states");
+        let joints = bench.fresh()?;
+        crate::values::near("position", &joints.position, &pose, 1e-9)?;
+        bench.pause(false)?;
+        Ok(format!("the starting pose after {how}"))
+    }),
 ];
-
-fn falls(bench: &mut Bench) -> Got {
-    let arm = bench.arm()?;
-    let pose = bench.reset()?;
-    let load = largest(&arm.gravity_load(&pose));
-    let joints = bench.joints_for(0.3)?.pop().ok_or("no joint states")?;
-    let moved = largest(&minus(&joints.position, &pose));
-    must(moved > 0.01 || load < 1e-9, || format!("moved {moved:.6} rad under a gravity load of {load:.2} N m"))?;
-    Ok(format!("moved {moved:.3} rad"))
-}
 
 /// Holds a pose near the starting pose; passes if the effort there is the arm's gravity load.
 fn holds(bench: &mut Bench, arm: &Arm, by: [f64; 3]) -> Got {
-    let pose = bench.reset()?;
-    let setpoint: Vec<f64> = pose.iter().zip(by).map(|(angle, by)| angle + by).collect();
-    bench.hold(&setpoint)?;
-    bench.enable(true)?;
+    held(bench, by, false)?;
     let Joints { position, effort, .. } = bench.at_rest()?;
     let load = arm.gravity_load(&position);
     let error = largest(&minus(&effort, &load)) / (largest(&load) + 1.0);
@@ -56,81 +115,10 @@ fn holds(bench: &mut Bench, arm: &Arm, by: [f64; 3]) -> Got {
     Ok(format!("effort {}, G(q) {}", list(&effort), list(&load)))
 }
 
-fn holds_gravity(bench: &mut Bench) -> Got {
-    let arm = Arm::of(bench.links, GRAVITY);
-    bench.set_holding_gains(false)?;
-    holds(bench, &arm, [-0.6, 0.9, -0.5])?;
-    holds(bench, &arm, [0.4, 0.3, 0.6])
-}
-
-fn holds_uneven(bench: &mut Bench) -> Got {
-    let arm = uneven(bench.links);
-    bench.set_arm(&arm)?;
-    bench.set_holding_gains(false)?;
-    holds(bench, &arm, [0.4, -1.0, 0.7])
-}
-
-fn couples(bench: &mut Bench) -> Got {
-    let pose = bench.float(0.0, 0.0, 0.0)?;
-    let mut kp = bench.each(0.0);
-    if let Some(first) = kp.first_mut() {
-        *first = 5.0;
-    }
-    bench.accepted("/pid_controller/set_gains", &json!({"kp": kp}))?;
-    bench.hold(&shifted(&pose, 1.0))?;
-    let Joints { velocity, effort, .. } = bench.joints_for(0.3)?.pop().ok_or("no joint states")?;
-    let others = velocity.iter().zip(&effort).skip(1);
-    for (rate, effort) in others {
-        must(*effort == 0.0 && rate.abs() > 0.05, || format!("rates {}, efforts {}", list(&velocity), list(&[*effort])))?;
-    }
-    Ok(format!("rates {}", list(&velocity)))
-}
-
 /// The largest deviation of a quantity from its first value, over that value's size.
 fn deviation(values: &[f64], size: f64) -> f64 {
     let first = values.first().copied().unwrap_or(f64::NAN);
     largest(&values.iter().map(|value| value - first).collect::<Vec<f64>>()) / size
-}
-
-fn keeps_energy(bench: &mut Bench) -> Got {
-    let arm = uneven(bench.links);
-    bench.set_arm(&arm)?;
-    bench.swing()?;
-    let states: Vec<_> = bench.joints_for(0.8)?.iter().map(Joints::state).collect();
-    let kinetic: Vec<f64> = states.iter().map(|state| arm.kinetic(state)).collect();
-    let total: Vec<f64> = states.iter().zip(&kinetic).map(|(state, kinetic)| kinetic + arm.potential(&state.position)).collect();
-    let exchanged = deviation(&kinetic, 1.0);
-    must(exchanged > 0.1, || format!("kinetic energy changes by {exchanged:.4} J alone"))?;
-    let error = deviation(&total, exchanged);
-    must(error < 1e-3, || format!("energy changes by {:.3} % of the {exchanged:.2} J exchanged", 100.0 * error))?;
-    Ok(format!("constant to {error:.1e} while {exchanged:.2} J are exchanged"))
-}
-
-fn keeps_momentum(bench: &mut Bench) -> Got {
-    let mut arm = uneven(bench.links);
-    arm.gravity = 0.0;
-    bench.set_arm(&arm)?;
-    bench.swing()?;
-    let momenta: Vec<f64> = bench.joints_for(0.8)?.iter().map(|joints| arm.momentum(&joints.state())).collect();
-    let size = largest(&momenta);
-    must(size > 0.1, || format!("an angular momentum of {size:.4} alone"))?;
-    let error = deviation(&momenta, size);
-    must(error < 1e-3, || format!("it changes by {:.3} % of {size:.3} kg m^2/s", 100.0 * error))?;
-    Ok(format!("{size:.3} kg m^2/s, constant to {error:.1e}"))
-}
-
-fn rates_change(bench: &mut Bench) -> Got {
-    bench.set_gravity(0.0)?;
-    bench.swing()?;
-    let states = bench.joints_for(0.6)?;
-    let size = states.iter().map(|joints| largest(&joints.velocity)).fold(0.0, f64::max);
-    let mut changes = Vec::new();
-    for joint in 0..bench.links {
-        let rates: Vec<f64> = states.iter().filter_map(|joints| joints.velocity.get(joint).copied()).collect();
-        changes.push(deviation(&rates, size));
-    }
-    must(changes.iter().all(|change| *change > 0.02), || format!("relative changes {}", list(&changes)))?;
-    Ok(format!("relative changes {}", list(&changes)))
 }
 
 /// Runs an aggressive controller at a timestep of 0.1 s. Returns the sign of divergence.
@@ -157,25 +145,8 @@ fn diverged(bench: &mut Bench) -> Got {
     Err(format!("at most {worst:.1} rad/s in 5 s"))
 }
 
-fn diverges(bench: &mut Bench) -> Got {
-    let got = diverged(bench);
-    // The next rule needs an arm that answers at its usual pace.
+/// The next rule needs an arm that answers at its usual pace.
+fn calm(bench: &mut Bench) -> Result<(), String> {
     bench.enable(false)?;
-    bench.accepted("/arm_sim/set_integrator", &json!({"timestep": 0.001}))?;
-    bench.reset()?;
-    got
-}
-
-fn comes_back(bench: &mut Bench) -> Got {
-    let pose = bench.reset()?;
-    let how = diverged(bench)?;
-    bench.enable(false)?;
-    bench.accepted("/arm_sim/set_integrator", &json!({"timestep": 0.001}))?;
-    bench.pause(true)?;
-    bench.reset()?;
-    bench.forget("/joint_states");
-    let joints = bench.fresh()?;
-    crate::values::near("position", &joints.position, &pose, 1e-9)?;
-    bench.pause(false)?;
-    Ok(format!("the starting pose after {how}"))
+    bench.accepted("/arm_sim/set_integrator", &json!({"timestep": 0.001})).map(drop)
 }

@@ -4,51 +4,124 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
+use crate::Check;
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY};
 use crate::values::{boolean, member, must, near, number, numbers_of, text};
-use crate::{Got, REJECTED, Rule, rule};
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule("goal-1", "A reachable goal is accepted with an id", "result true and a goal_id that is a text", accepts),
-    rule(
-        "goal-2",
-        "An unreachable goal is rejected and leaves the active goal alone",
-        "result false; feedback of the old goal goes on, no result",
-        leaves_alone,
-    ),
-    rule("goal-3", "A goal without a numeric x or y is rejected", REJECTED, |bench| {
-        bench.rejects(SEND, &[json!({}), json!({"x": 1.0}), json!({"y": 1.0}), json!({"x": "1", "y": 1.0})])
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("goal-1", |bench| {
+        let goal = endless(bench);
+        let id = bench.send_goal(&goal)?;
+        Ok(format!("goal_id {id}"))
     }),
-    rule("goal-4", "epsilon must be positive and success_hold not negative", REJECTED, |bench| {
+    ("goal-2", |bench| {
+        let (_, id) = active(bench)?;
+        let status = bench.rejected(SEND, &json!({"x": 50.0, "y": 0.0, "phi": 0.0}))?.status;
+        bench.forget(FEEDBACK);
+        no_result(bench, &id)?;
+        bench.forget(FEEDBACK);
+        let msg = bench.message(FEEDBACK, PATIENCE)?;
+        must(is_of(&msg, &id), || format!("feedback of another goal: {msg}"))?;
+        Ok(format!("rejected with: {status}"))
+    }),
+    ("goal-3", |bench| bench.rejects(SEND, &[json!({}), json!({"x": 1.0}), json!({"y": 1.0}), json!({"x": "1", "y": 1.0})])),
+    ("goal-4", |bench| {
         let bad = [json!({"epsilon": 0.0}), json!({"epsilon": -0.1}), json!({"success_hold": -1.0})];
         bench.rejects(SEND, &bad.map(|option| goal_at(bench, [0.5, -0.8, 0.4], &option)))
     }),
-    rule("goal-5", "A goal is commanded on /joint_trajectory", "a point that reaches the target", commands),
-    rule("goal-6", "Feedback comes while a goal is active", "goal_id, target, positions, distance_remaining and elapsed", feedback),
-    rule(
-        "goal-7",
-        "A new goal preempts the active one",
-        "a result with the old id, outcome preempted, target and final_distance",
-        preempts,
-    ),
-    rule("goal-8", "cancel_goal without an active goal is rejected", REJECTED, nothing_to_cancel),
-    rule("goal-9", "cancel_goal with another goal's id is rejected without effect", "result false; no result of the active goal", wrong_id),
-    rule(
-        "goal-10",
-        "cancel_goal with the goal's id, or with none, preempts it",
-        "result true, and a result with outcome preempted",
-        cancels,
-    ),
-    rule(
-        "goal-11",
-        "A goal is reached once the arm has stayed within epsilon for success_hold",
-        "outcome reached, not before success_hold, final_distance <= epsilon",
-        reached,
-    ),
-    rule("goal-12", "success_hold 0 is satisfied on first entry", "outcome reached within 1 s for an epsilon of 10 m", at_once),
-    rule("goal-13", "A goal has exactly one result", "one message for the goal", one_result),
+    ("goal-5", |bench| {
+        bench.watch("/joint_trajectory")?;
+        let goal = endless(bench);
+        bench.send_goal(&goal)?;
+        let msg = bench.message("/joint_trajectory", PATIENCE)?;
+        let points = member(&msg, "points")?.as_array().map_or(0, Vec::len);
+        let last = points.checked_sub(1).ok_or("no points")?;
+        let positions = numbers_of(&msg, &format!("points/{last}/positions"), bench.links)?;
+        reaches(bench, &positions, &goal)?;
+        Ok(crate::values::list(&positions))
+    }),
+    ("goal-6", |bench| {
+        let (goal, id) = active(bench)?;
+        let msg = bench.message_that(FEEDBACK, PATIENCE, "feedback", |msg| is_of(msg, &id))?;
+        has_target(bench, &msg, &goal)?;
+        let positions = numbers_of(&msg, "positions", bench.links)?;
+        reaches(bench, &positions, &goal)?;
+        let (distance, elapsed) = (number(&msg, "distance_remaining")?, number(&msg, "elapsed")?);
+        must(distance >= 0.0 && elapsed >= 0.0, || format!("distance_remaining {distance}, elapsed {elapsed}"))?;
+        let later = bench.message_that(FEEDBACK, PATIENCE, "later feedback", |msg| {
+            is_of(msg, &id) && number(msg, "elapsed").is_ok_and(|later| later > elapsed)
+        })?;
+        Ok(later.to_string())
+    }),
+    ("goal-7", |bench| {
+        let (goal, id) = active(bench)?;
+        let next = goal_at(bench, [-0.5, 0.9, 0.2], &json!({"epsilon": 1e-6, "success_hold": 1000.0}));
+        let other = bench.send_goal(&next)?;
+        must(id != other, || format!("both goals have the id {id}"))?;
+        Ok(ended(bench, &id, &goal, "preempted", PATIENCE)?.to_string())
+    }),
+    ("goal-8", |bench| {
+        // A goal of an earlier rule, if there is one.
+        bench.peer.call(CANCEL, &json!({})).map(drop)?;
+        Ok(bench.rejected(CANCEL, &json!({}))?.status)
+    }),
+    ("goal-9", |bench| {
+        let (_, id) = active(bench)?;
+        let status = bench.rejected(CANCEL, &json!({"goal_id": format!("not-{id}")}))?.status;
+        no_result(bench, &id)?;
+        Ok(status)
+    }),
+    ("goal-10", |bench| {
+        listen(bench)?;
+        let mut last = Value::Null;
+        for names_goal in [true, false] {
+            let goal = endless(bench);
+            let id = bench.send_goal(&goal)?;
+            let args = if names_goal { json!({"goal_id": id}) } else { json!({}) };
+            bench.accepted(CANCEL, &args)?;
+            last = ended(bench, &id, &goal, "preempted", PATIENCE)?;
+        }
+        Ok(last.to_string())
+    }),
+    ("goal-11", |bench| {
+        listen(bench)?;
+        let (epsilon, hold) = (0.05, 0.5);
+        let goal = goal_at(bench, [0.5, -0.4, 0.3], &json!({"epsilon": epsilon, "success_hold": hold}));
+        let id = bench.send_goal(&goal)?;
+        let msg = ended(bench, &id, &goal, "reached", Duration::from_secs(10))?;
+        let distance = number(&msg, "final_distance")?;
+        must(distance <= epsilon * 1.001, || format!("final_distance {distance}"))?;
+        // Feedback that came before the result: the time since the arm was last outside, and the time of the last one.
+        let (mut outside, mut last) = (0.0, 0.0);
+        while let Ok(msg) = bench.message_that(FEEDBACK, Duration::from_millis(1), "feedback", |msg| is_of(msg, &id)) {
+            last = number(&msg, "elapsed")?;
+            if number(&msg, "distance_remaining")? > epsilon {
+                outside = last;
+            }
+        }
+        // One feedback interval, at 10 Hz or faster, is not seen at either end.
+        must(last - outside > hold - 0.2, || format!("{:.2} s inside", last - outside))?;
+        Ok(format!("reached at {distance:.4} m after {:.2} s inside", last - outside))
+    }),
+    ("goal-12", |bench| {
+        listen(bench)?;
+        let goal = wide(bench);
+        let id = bench.send_goal(&goal)?;
+        Ok(ended(bench, &id, &goal, "reached", Duration::from_secs(1))?.to_string())
+    }),
+    ("goal-13", |bench| {
+        listen(bench)?;
+        let goal = wide(bench);
+        let id = bench.send_goal(&goal)?;
+        result(bench, &id, Duration::from_secs(1))?;
+        // A goal that has ended is not preempted.
+        bench.peer.call(CANCEL, &json!({})).map(drop)?;
+        no_result(bench, &id)?;
+        must(boolean(&bench.accepted("/arm_sim/pause", &json!({}))?, "data").is_ok(), || "no answer".to_owned())?;
+        Ok("one".to_owned())
+    }),
 ];
 
 const SEND: &str = "/ik_action/send_goal";
@@ -79,10 +152,6 @@ fn endless(bench: &Bench) -> Value {
     goal_at(bench, [0.5, -0.8, 0.4], &json!({"epsilon": 1e-6, "success_hold": 1000.0}))
 }
 
-fn unreachable_goal() -> Value {
-    json!({"x": 50.0, "y": 0.0, "phi": 0.0})
-}
-
 /// Subscribes to feedback and results, and enables a controller that can hold the arm.
 fn listen(bench: &mut Bench) -> Result<(), String> {
     bench.set_holding_gains(true)?;
@@ -101,9 +170,34 @@ fn is_of(msg: &Value, id: &str) -> bool {
     msg.get("goal_id").and_then(Value::as_str) == Some(id)
 }
 
+/// Sends a goal that stays active, after `listen`: the goal and its id.
+fn active(bench: &mut Bench) -> Result<(Value, String), String> {
+    listen(bench)?;
+    let goal = endless(bench);
+    let id = bench.send_goal(&goal)?;
+    Ok((goal, id))
+}
+
 /// The result of a goal.
 fn result(bench: &mut Bench, id: &str, within: Duration) -> Result<Value, String> {
     bench.message_that(RESULT, within, &format!("the result of goal {id}"), |msg| is_of(msg, id))
+}
+
+/// The result of a goal, which must have this outcome and the goal's target.
+fn ended(bench: &mut Bench, id: &str, goal: &Value, outcome: &str, within: Duration) -> Result<Value, String> {
+    let msg = result(bench, id, within)?;
+    let got = text(&msg, "outcome")?;
+    must(got == outcome, || format!("outcome {got}"))?;
+    let distance = number(&msg, "final_distance")?;
+    must(distance >= 0.0, || format!("final_distance {distance}"))?;
+    has_target(bench, &msg, goal)?;
+    Ok(msg)
+}
+
+/// Passes if a pose reaches a goal.
+fn reaches(bench: &Bench, pose: &[f64], goal: &Value) -> Result<(), String> {
+    let (x, y, _) = Arm::of(bench.links, GRAVITY).end_effector(pose);
+    near("the end effector", &[x, y], &[number(goal, "x")?, number(goal, "y")?], 1e-6)
 }
 
 /// Passes if no result of a goal comes for a moment.
@@ -123,152 +217,7 @@ fn has_target(bench: &Bench, msg: &Value, goal: &Value) -> Result<(), String> {
     Ok(())
 }
 
-fn accepts(bench: &mut Bench) -> Got {
-    let goal = endless(bench);
-    let id = bench.send_goal(&goal)?;
-    Ok(format!("goal_id {id}"))
-}
-
-fn leaves_alone(bench: &mut Bench) -> Got {
-    listen(bench)?;
-    let goal = endless(bench);
-    let id = bench.send_goal(&goal)?;
-    let status = bench.rejected(SEND, &unreachable_goal())?.status;
-    bench.forget(FEEDBACK);
-    no_result(bench, &id)?;
-    bench.forget(FEEDBACK);
-    let msg = bench.message(FEEDBACK, PATIENCE)?;
-    must(is_of(&msg, &id), || format!("feedback of another goal: {msg}"))?;
-    Ok(format!("rejected with: {status}"))
-}
-
-fn commands(bench: &mut Bench) -> Got {
-    bench.watch("/joint_trajectory")?;
-    let goal = endless(bench);
-    bench.send_goal(&goal)?;
-    let msg = bench.message("/joint_trajectory", PATIENCE)?;
-    let points = member(&msg, "points")?.as_array().map_or(0, Vec::len);
-    let last = points.checked_sub(1).ok_or("no points")?;
-    let positions = numbers_of(&msg, &format!("points/{last}/positions"), bench.links)?;
-    let (x, y, _) = Arm::of(bench.links, GRAVITY).end_effector(&positions);
-    near("x and y", &[x, y], &[number(&goal, "x")?, number(&goal, "y")?], 1e-6)?;
-    Ok(crate::values::list(&positions))
-}
-
-fn feedback(bench: &mut Bench) -> Got {
-    listen(bench)?;
-    let goal = endless(bench);
-    let id = bench.send_goal(&goal)?;
-    let msg = bench.message_that(FEEDBACK, PATIENCE, "feedback", |msg| is_of(msg, &id))?;
-    has_target(bench, &msg, &goal)?;
-    let positions = numbers_of(&msg, "positions", bench.links)?;
-    let (x, y, _) = Arm::of(bench.links, GRAVITY).end_effector(&positions);
-    near("the end effector of positions", &[x, y], &[number(&goal, "x")?, number(&goal, "y")?], 1e-6)?;
-    let (distance, elapsed) = (number(&msg, "distance_remaining")?, number(&msg, "elapsed")?);
-    must(distance >= 0.0 && elapsed >= 0.0, || format!("distance_remaining {distance}, elapsed {elapsed}"))?;
-    let later = bench.message_that(FEEDBACK, PATIENCE, "later feedback", |msg| {
-        is_of(msg, &id) && number(msg, "elapsed").is_ok_and(|later| later > elapsed)
-    })?;
-    Ok(later.to_string())
-}
-
-/// Passes if the result is a preemption of the goal.
-fn is_preempted(bench: &Bench, msg: &Value, goal: &Value) -> Result<(), String> {
-    let outcome = text(msg, "outcome")?;
-    must(outcome == "preempted", || format!("outcome {outcome}"))?;
-    let distance = number(msg, "final_distance")?;
-    must(distance >= 0.0, || format!("final_distance {distance}"))?;
-    has_target(bench, msg, goal)
-}
-
-fn preempts(bench: &mut Bench) -> Got {
-    listen(bench)?;
-    let goal = endless(bench);
-    let id = bench.send_goal(&goal)?;
-    let next = goal_at(bench, [-0.5, 0.9, 0.2], &json!({"epsilon": 1e-6, "success_hold": 1000.0}));
-    let other = bench.send_goal(&next)?;
-    must(id != other, || format!("both goals have the id {id}"))?;
-    let msg = result(bench, &id, PATIENCE)?;
-    is_preempted(bench, &msg, &goal)?;
-    Ok(msg.to_string())
-}
-
-fn nothing_to_cancel(bench: &mut Bench) -> Got {
-    // A goal of an earlier rule, if there is one.
-    bench.peer.call(CANCEL, &json!({})).map(drop)?;
-    Ok(bench.rejected(CANCEL, &json!({}))?.status)
-}
-
-fn wrong_id(bench: &mut Bench) -> Got {
-    listen(bench)?;
-    let goal = endless(bench);
-    let id = bench.send_goal(&goal)?;
-    let status = bench.rejected(CANCEL, &json!({"goal_id": format!("not-{id}")}))?.status;
-    no_result(bench, &id)?;
-    Ok(status)
-}
-
-fn cancels(bench: &mut Bench) -> Got {
-    listen(bench)?;
-    let mut last = Value::Null;
-    for names_goal in [true, false] {
-        let goal = endless(bench);
-        let id = bench.send_goal(&goal)?;
-        let args = if names_goal { json!({"goal_id": id}) } else { json!({}) };
-        bench.accepted(CANCEL, &args)?;
-        last = result(bench, &id, PATIENCE)?;
-        is_preempted(bench, &last, &goal)?;
-    }
-    Ok(last.to_string())
-}
-
-fn reached(bench: &mut Bench) -> Got {
-    listen(bench)?;
-    let (epsilon, hold) = (0.05, 0.5);
-    let goal = goal_at(bench, [0.5, -0.4, 0.3], &json!({"epsilon": epsilon, "success_hold": hold}));
-    let id = bench.send_goal(&goal)?;
-    let msg = result(bench, &id, Duration::from_secs(10))?;
-    let outcome = text(&msg, "outcome")?;
-    must(outcome == "reached", || format!("outcome {outcome}"))?;
-    let distance = number(&msg, "final_distance")?;
-    must(distance <= epsilon * 1.001, || format!("final_distance {distance}"))?;
-    has_target(bench, &msg, &goal)?;
-    // Feedback that came before the result: the time since the arm was last outside, and the time of the last one.
-    let (mut outside, mut last) = (0.0, 0.0);
-    while let Ok(msg) = bench.message_that(FEEDBACK, Duration::from_millis(1), "feedback", |msg| is_of(msg, &id)) {
-        last = number(&msg, "elapsed")?;
-        if number(&msg, "distance_remaining")? > epsilon {
-            outside = last;
-        }
-    }
-    // One feedback interval, at 10 Hz or faster, is not seen at either end.
-    must(last - outside > hold - 0.2, || format!("{:.2} s inside", last - outside))?;
-    Ok(format!("reached at {distance:.4} m after {:.2} s inside", last - outside))
-}
-
 /// A goal that is reached wherever the arm is.
 fn wide(bench: &Bench) -> Value {
     goal_at(bench, [0.5, -0.4, 0.3], &json!({"epsilon": 10.0, "success_hold": 0.0}))
-}
-
-fn at_once(bench: &mut Bench) -> Got {
-    listen(bench)?;
-    let goal = wide(bench);
-    let id = bench.send_goal(&goal)?;
-    let msg = result(bench, &id, Duration::from_secs(1))?;
-    let outcome = text(&msg, "outcome")?;
-    must(outcome == "reached", || format!("outcome {outcome}"))?;
-    Ok(outcome.to_owned())
-}
-
-fn one_result(bench: &mut Bench) -> Got {
-    listen(bench)?;
-    let goal = wide(bench);
-    let id = bench.send_goal(&goal)?;
-    result(bench, &id, Duration::from_secs(1))?;
-    // A goal that has ended is not preempted.
-    bench.peer.call(CANCEL, &json!({})).map(drop)?;
-    no_result(bench, &id)?;
-    must(boolean(&bench.accepted("/arm_sim/pause", &json!({}))?, "data").is_ok(), || "no answer".to_owned())?;
-    Ok("one".to_owned())
 }

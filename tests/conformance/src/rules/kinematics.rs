@@ -7,51 +7,89 @@ use serde_json::{Value, json};
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY};
 use crate::values::{list, must, near, numbers_of};
-use crate::{Got, Links, REJECTED, Rule, rule};
-
-const fn only(links: Links, rule: Rule) -> Rule {
-    Rule { links, ..rule }
-}
+use crate::{Check, Got};
 
 const SOLVE: &str = "/ik/solve";
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    only(
-        Links::Two,
-        rule("ik-1", "The solution reaches the target", "x and y by forward kinematics, for 40 targets, to 1e-6 m", round_trip),
-    ),
-    only(
-        Links::Three,
-        rule(
-            "ik-2",
-            "The solution reaches the target with its orientation",
-            "x, y and phi by forward kinematics, for 40 targets, to 1e-6",
-            round_trip,
-        ),
-    ),
-    only(Links::Three, rule("ik-3", "phi is optional for 3 links", "x and y by forward kinematics, for 10 targets", without_phi)),
-    only(Links::Two, rule("ik-4", "phi is ignored for 2 links", "x and y by forward kinematics, for any phi", ignores_phi)),
-    rule("ik-5", "A request without a numeric x or y is rejected", REJECTED, |bench| {
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("ik-1", round_trip),
+    ("ik-2", round_trip),
+    ("ik-3", |bench| {
+        let (mut draws, arm) = (Draws(8), Arm::of(bench.links, GRAVITY));
+        for _ in 0..10 {
+            let (x, y, _) = arm.end_effector(&draws.pose(bench.links));
+            reaches(bench, &arm, &json!({"x": x, "y": y}), (x, y), None, 1e-6)?;
+        }
+        Ok("10 targets reached".to_owned())
+    }),
+    ("ik-4", |bench| {
+        let arm = Arm::of(bench.links, GRAVITY);
+        for phi in [-2.0, 0.0, 1.0, 100.0] {
+            reaches(bench, &arm, &json!({"x": 1.1, "y": -0.6, "phi": phi}), (1.1, -0.6), None, 1e-6)?;
+        }
+        Ok("4 targets reached".to_owned())
+    }),
+    ("ik-5", |bench| {
         let wrong = [json!({"x": "1", "y": 1.0}), json!({"x": 1.0, "y": null}), json!({"x": 1.0, "y": [0.5]})];
         bench.rejects(SOLVE, &[json!({}), json!({"x": 1.0}), json!({"y": 1.0})])?;
         bench.rejects(SOLVE, &wrong)
     }),
-    rule("ik-6", "A target beyond the full extension is rejected", "result false and a status, in 8 directions", too_far),
-    only(Links::Two, rule("ik-7", "A target closer than |l1 - l2| is rejected", "result false and a status, in 8 directions", too_near)),
-    only(
-        Links::Three,
-        rule(
-            "ik-8",
-            "An orientation that puts the wrist out of reach is rejected",
-            "result false and a status; the same target is accepted with another phi",
-            wrist_out,
-        ),
-    ),
-    rule("ik-9", "The fully extended target counts as reachable", "a solution to 1e-4 m, in 24 directions", extended),
-    only(Links::Two, rule("ik-10", "The fully folded target counts as reachable", "a solution to 1e-4 m, in 24 directions", folded)),
-    rule("ik-11", "New lengths count at once", "a solution for the new lengths, a rejection of a target that is now too far", new_lengths),
-    rule("ik-12", "A solve does not move the arm", "the same joint states before and after", moves_nothing),
+    ("ik-6", |bench| {
+        let reach = Arm::of(bench.links, GRAVITY).lengths.iter().sum::<f64>();
+        rejects_at(bench, &[1.001 * reach, 10.0 * reach])
+    }),
+    ("ik-7", |bench| {
+        bench.set_arm(&unequal())?;
+        rejects_at(bench, &[0.399, 0.1, 0.0])
+    }),
+    ("ik-8", |bench| {
+        // 1.5 m away, links of 1 m: with phi pointing back at the base the wrist is 2.5 m away.
+        let arm = Arm::of(3, GRAVITY);
+        let status = bench.rejected(SOLVE, &json!({"x": 1.5, "y": 0.0, "phi": PI}))?.status;
+        reaches(bench, &arm, &json!({"x": 1.5, "y": 0.0, "phi": 0.0}), (1.5, 0.0), Some(0.0), 1e-6)?;
+        Ok(status)
+    }),
+    ("ik-9", |bench| {
+        let arm = Arm { lengths: [0.7, 0.3, 0.1].into_iter().take(bench.links).collect(), ..Arm::of(bench.links, GRAVITY) };
+        bench.set_arm(&arm)?;
+        let reach: f64 = arm.lengths.iter().sum();
+        for heading in directions(24) {
+            let (x, y) = (reach * heading.cos(), reach * heading.sin());
+            let target = target(bench, x, y, heading);
+            reaches(bench, &arm, &target, (x, y), None, 1e-4)?;
+        }
+        Ok("24 solutions".to_owned())
+    }),
+    ("ik-10", |bench| {
+        let arm = unequal();
+        bench.set_arm(&arm)?;
+        for heading in directions(24) {
+            let (x, y) = (0.4 * heading.cos(), 0.4 * heading.sin());
+            reaches(bench, &arm, &json!({"x": x, "y": y}), (x, y), None, 1e-4)?;
+        }
+        Ok("24 solutions".to_owned())
+    }),
+    ("ik-11", |bench| {
+        let long = Arm { lengths: bench.each(2.0), ..Arm::of(bench.links, GRAVITY) };
+        bench.set_arm(&long)?;
+        let far = 1.9 * bench.each(1.0).iter().sum::<f64>();
+        let wide = target(bench, far, 0.1, 0.0);
+        reaches(bench, &long, &wide, (far, 0.1), None, 1e-6)?;
+        bench.set_arm(&Arm::of(bench.links, GRAVITY))?;
+        bench.rejects(SOLVE, &[wide])
+    }),
+    ("ik-12", |bench| {
+        bench.swing()?;
+        bench.pause(true)?;
+        let before = bench.fresh()?;
+        let target = target(bench, 0.8, 0.9, 0.5);
+        bench.accepted(SOLVE, &target)?;
+        let after = bench.fresh()?;
+        near("position", &after.position, &before.position, 1e-12)?;
+        must(after.effort == before.effort, || format!("effort {} after {}", list(&after.effort), list(&before.effort)))?;
+        Ok("the same state".to_owned())
+    }),
 ];
 
 /// Numbers in [0, 1) that are the same in every run.
@@ -109,23 +147,6 @@ fn round_trip(bench: &mut Bench) -> Got {
     Ok(format!("40 targets reached, the last by {}", list(&last)))
 }
 
-fn without_phi(bench: &mut Bench) -> Got {
-    let (mut draws, arm) = (Draws(8), Arm::of(bench.links, GRAVITY));
-    for _ in 0..10 {
-        let (x, y, _) = arm.end_effector(&draws.pose(bench.links));
-        reaches(bench, &arm, &json!({"x": x, "y": y}), (x, y), None, 1e-6)?;
-    }
-    Ok("10 targets reached".to_owned())
-}
-
-fn ignores_phi(bench: &mut Bench) -> Got {
-    let arm = Arm::of(bench.links, GRAVITY);
-    for phi in [-2.0, 0.0, 1.0, 100.0] {
-        reaches(bench, &arm, &json!({"x": 1.1, "y": -0.6, "phi": phi}), (1.1, -0.6), None, 1e-6)?;
-    }
-    Ok("4 targets reached".to_owned())
-}
-
 fn directions(count: u32) -> impl Iterator<Item = f64> {
     (0..count).map(move |k| TAU * f64::from(k) / f64::from(count))
 }
@@ -138,69 +159,7 @@ fn rejects_at(bench: &mut Bench, distances: &[f64]) -> Got {
     bench.rejects(SOLVE, &targets)
 }
 
-fn too_far(bench: &mut Bench) -> Got {
-    let reach = Arm::of(bench.links, GRAVITY).lengths.iter().sum::<f64>();
-    rejects_at(bench, &[1.001 * reach, 10.0 * reach])
-}
-
 /// 2 links of 1 m and 0.6 m.
 fn unequal() -> Arm {
     Arm { lengths: vec![1.0, 0.6], ..Arm::of(2, GRAVITY) }
-}
-
-fn too_near(bench: &mut Bench) -> Got {
-    bench.set_arm(&unequal())?;
-    rejects_at(bench, &[0.399, 0.1, 0.0])
-}
-
-fn wrist_out(bench: &mut Bench) -> Got {
-    // 1.5 m away, links of 1 m: with phi pointing back at the base the wrist is 2.5 m away.
-    let arm = Arm::of(3, GRAVITY);
-    let status = bench.rejected(SOLVE, &json!({"x": 1.5, "y": 0.0, "phi": PI}))?.status;
-    reaches(bench, &arm, &json!({"x": 1.5, "y": 0.0, "phi": 0.0}), (1.5, 0.0), Some(0.0), 1e-6)?;
-    Ok(status)
-}
-
-fn extended(bench: &mut Bench) -> Got {
-    let arm = Arm { lengths: [0.7, 0.3, 0.1].into_iter().take(bench.links).collect(), ..Arm::of(bench.links, GRAVITY) };
-    bench.set_arm(&arm)?;
-    let reach: f64 = arm.lengths.iter().sum();
-    for heading in directions(24) {
-        let (x, y) = (reach * heading.cos(), reach * heading.sin());
-        let target = target(bench, x, y, heading);
-        reaches(bench, &arm, &target, (x, y), None, 1e-4)?;
-    }
-    Ok("24 solutions".to_owned())
-}
-
-fn folded(bench: &mut Bench) -> Got {
-    let arm = unequal();
-    bench.set_arm(&arm)?;
-    for heading in directions(24) {
-        let (x, y) = (0.4 * heading.cos(), 0.4 * heading.sin());
-        reaches(bench, &arm, &json!({"x": x, "y": y}), (x, y), None, 1e-4)?;
-    }
-    Ok("24 solutions".to_owned())
-}
-
-fn new_lengths(bench: &mut Bench) -> Got {
-    let long = Arm { lengths: bench.each(2.0), ..Arm::of(bench.links, GRAVITY) };
-    bench.set_arm(&long)?;
-    let far = 1.9 * bench.each(1.0).iter().sum::<f64>();
-    let wide = target(bench, far, 0.1, 0.0);
-    reaches(bench, &long, &wide, (far, 0.1), None, 1e-6)?;
-    bench.set_arm(&Arm::of(bench.links, GRAVITY))?;
-    bench.rejects(SOLVE, &[wide])
-}
-
-fn moves_nothing(bench: &mut Bench) -> Got {
-    bench.swing()?;
-    bench.pause(true)?;
-    let before = bench.fresh()?;
-    let target = target(bench, 0.8, 0.9, 0.5);
-    bench.accepted(SOLVE, &target)?;
-    let after = bench.fresh()?;
-    near("position", &after.position, &before.position, 1e-12)?;
-    must(after.effort == before.effort, || format!("effort {} after {}", list(&after.effort), list(&before.effort)))?;
-    Ok("the same state".to_owned())
 }

@@ -1,4 +1,4 @@
-//! The rules, a file for each part of the specification, in its order.
+//! The rules: `rules.txt` has them in words, in the order of the specification's sections, and a file for each part has the checks.
 
 pub mod checkpoint;
 pub mod control_services;
@@ -13,19 +13,39 @@ pub mod trials;
 
 use crate::{Category, Rule};
 
+/// A heading names a category. A row has the id, with the number of links if the rule is for one, the rule and the expected outcome.
+const RULES: &str = include_str!("rules.txt");
+
 /// All rules, in the order of the specification's sections.
 pub fn all() -> impl Iterator<Item = Rule> {
-    let sections = [
-        (Category::Dynamics, envelope::RULES),
-        (Category::Integrators, checkpoint::RULES),
-        (Category::Dynamics, topics::RULES),
-        (Category::Dynamics, control_services::RULES),
-        (Category::Pid, pid::RULES),
-        (Category::Dynamics, dynamics::RULES),
-        (Category::Integrators, methods::RULES),
-        (Category::Kinematics, kinematics::RULES),
-        (Category::Kinematics, goals::RULES),
-        (Category::Kinematics, trials::RULES),
+    let mut category = Category::Dynamics;
+    RULES.lines().filter_map(move |line| {
+        if let Some(name) = line.strip_prefix("# ") {
+            category = Category::ALL.into_iter().find(|one| one.name() == name)?;
+            return None;
+        }
+        let mut cells = line.split(" | ");
+        let (head, says, expected) = (cells.next()?, cells.next()?, cells.next()?);
+        let (id, links) = head.split_once(" (").unwrap_or((head, ""));
+        let links = links.strip_suffix(" links)").and_then(|links| links.parse().ok());
+        let (_, check) = checks().find(|(name, _)| *name == id)?;
+        Some(Rule { id, category, links, says, expected, check: *check })
+    })
+}
+
+/// The checks of all parts.
+pub fn checks() -> impl Iterator<Item = &'static crate::Check> {
+    let parts = [
+        envelope::CHECKS,
+        checkpoint::CHECKS,
+        topics::CHECKS,
+        control_services::CHECKS,
+        pid::CHECKS,
+        dynamics::CHECKS,
+        methods::CHECKS,
+        kinematics::CHECKS,
+        goals::CHECKS,
+        trials::CHECKS,
     ];
-    sections.into_iter().flat_map(|(category, rules)| rules.iter().map(move |rule| Rule { category, ..*rule }))
+    parts.into_iter().flatten()
 }

@@ -9,34 +9,93 @@ use serde_json::json;
 
 use crate::bench::{Bench, Joints, point, shifted};
 use crate::values::{largest, list, must, near};
-use crate::{Got, Rule, rule};
+use crate::{Check, Got};
 
 /// The gain that makes a setpoint visible.
 const SMALL: f64 = 0.5;
 /// How exactly: the arm moves a little [rad, rad/s].
 const TOLERANCE: f64 = 0.03;
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule("trajectory-1", "positions of a point become the setpoint", "effort = kp (positions - actual)", position),
-    rule("trajectory-2", "Only the last point counts, at once", "effort as for the last of three points", last_point),
-    rule("trajectory-3", "velocities of the point become the velocity setpoint", "effort = kd (velocities - actual)", velocity),
-    rule("trajectory-4", "velocities that are left out are zeros", "effort as for zero velocity", no_velocity),
-    rule("trajectory-5", "velocities of the wrong length are zeros", "effort as for zero velocity, and the new position", wrong_velocity),
-    rule("trajectory-6", "positions of the wrong length are ignored", "the setpoint stays", |bench| {
-        stays(bench, &json!([point(&[0.9], &[0.0])]))
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("trajectory-1", |bench| {
+        bench.float(SMALL, 0.0, 0.0)?;
+        let angles = angles(bench);
+        bench.command(&json!([point(&angles, &bench.each(0.0))]))?;
+        position_is(bench, &angles)
     }),
-    rule("trajectory-7", "A trajectory without points is ignored", "the setpoint stays", |bench| stays(bench, &json!([]))),
-    rule("trajectory-8", "A trajectory counts while the controller is off", "its setpoint holds once the controller is on", while_off),
-    rule("states-1", "/joint_states is published continuously", "at least 5 messages in a second", continuous),
-    rule("states-2", "name has one entry per joint, all different", "as many names as links", names),
-    rule("states-3", "position, velocity and effort are parallel to name", "arrays of finite numbers of that length", parallel),
-    rule(
-        "states-4",
-        "The header has a stamp that does not run backwards",
-        "sec and nanosec, 0 <= nanosec < 1e9, later stamps not smaller",
-        stamps,
-    ),
+    ("trajectory-2", |bench| {
+        bench.float(SMALL, 0.0, 0.0)?;
+        let (angles, rest) = (angles(bench), bench.each(0.0));
+        let mut last = point(&angles, &rest);
+        if let Some(time) = last.pointer_mut("/time_from_start/sec") {
+            *time = json!(5);
+        }
+        bench.command(&json!([point(&shifted(&angles, 1.0), &rest), point(&shifted(&angles, -1.0), &rest), last]))?;
+        position_is(bench, &angles)
+    }),
+    ("trajectory-3", |bench| {
+        with_velocity(bench)?;
+        velocity_is(bench, 0.4)
+    }),
+    ("trajectory-4", |bench| {
+        with_velocity(bench)?;
+        bench.command(&json!([{"positions": angles(bench), "time_from_start": {"sec": 0, "nanosec": 0}}]))?;
+        velocity_is(bench, 0.0)
+    }),
+    ("trajectory-5", |bench| {
+        with_velocity(bench)?;
+        let angles = angles(bench);
+        bench.command(&json!([point(&angles, &[0.7])]))?;
+        velocity_is(bench, 0.0)?;
+        bench.set_gains(SMALL, 0.0, 0.0)?;
+        position_is(bench, &angles)
+    }),
+    ("trajectory-6", |bench| stays(bench, &json!([point(&[0.9], &[0.0])]))),
+    ("trajectory-7", |bench| stays(bench, &json!([]))),
+    ("trajectory-8", |bench| {
+        bench.float(SMALL, 0.0, 0.0)?;
+        bench.enable(false)?;
+        let angles = angles(bench);
+        bench.command(&json!([point(&angles, &bench.each(0.0))]))?;
+        bench.enable(true)?;
+        position_is(bench, &angles)
+    }),
+    ("states-1", |bench| {
+        bench.fresh()?;
+        bench.forget("/joint_states");
+        let count = bench.messages_for("/joint_states", Duration::from_secs(1))?.len();
+        must(count >= 5, || format!("{count} messages"))?;
+        Ok(format!("{count} messages"))
+    }),
+    ("states-2", |bench| {
+        let name = bench.fresh()?.name;
+        let mut distinct = name.clone();
+        distinct.sort();
+        distinct.dedup();
+        must(distinct.len() == bench.links && name.len() == bench.links, || format!("{name:?}"))?;
+        Ok(format!("{name:?}"))
+    }),
+    ("states-3", |bench| {
+        bench.swing()?;
+        let states = bench.joints_for(0.2)?;
+        Ok(format!("{} messages with {} entries", states.len(), bench.links))
+    }),
+    ("states-4", |bench| {
+        bench.fresh()?;
+        let mut last = f64::NEG_INFINITY;
+        for _ in 0..15 {
+            let msg = bench.message("/joint_states", Duration::from_secs(2))?;
+            let stamp = Joints::read(&msg)?.stamp;
+            let nanosec = msg.pointer("/header/stamp/nanosec").or_else(|| msg.pointer("/header/stamp/nsecs"));
+            let nanosec = nanosec.and_then(serde_json::Value::as_u64);
+            must(nanosec.is_some_and(|nanosec| nanosec < 1_000_000_000), || format!("nanosec {nanosec:?}"))?;
+            must(stamp >= last, || format!("{stamp} after {last}"))?;
+            last = stamp;
+        }
+        must(largest(&[last]).is_finite(), || "no stamp".to_owned())?;
+        Ok(format!("15 stamps, the last {last:.3} s"))
+    }),
 ];
 
 /// Passes if the effort shows these angles as the setpoint of the positions.
@@ -60,48 +119,10 @@ fn angles(bench: &Bench) -> Vec<f64> {
     [0.4, -0.3, 0.2].into_iter().take(bench.links).collect()
 }
 
-fn position(bench: &mut Bench) -> Got {
-    bench.float(SMALL, 0.0, 0.0)?;
-    let angles = angles(bench);
-    bench.command(&json!([point(&angles, &bench.each(0.0))]))?;
-    position_is(bench, &angles)
-}
-
-fn last_point(bench: &mut Bench) -> Got {
-    bench.float(SMALL, 0.0, 0.0)?;
-    let (angles, rest) = (angles(bench), bench.each(0.0));
-    let mut last = point(&angles, &rest);
-    if let Some(time) = last.pointer_mut("/time_from_start/sec") {
-        *time = json!(5);
-    }
-    bench.command(&json!([point(&shifted(&angles, 1.0), &rest), point(&shifted(&angles, -1.0), &rest), last]))?;
-    position_is(bench, &angles)
-}
-
 /// With the derivative term alone and a velocity setpoint of 0.4 rad/s.
 fn with_velocity(bench: &mut Bench) -> Result<(), String> {
     let pose = bench.float(0.0, 0.0, SMALL)?;
     bench.command(&json!([point(&pose, &bench.each(0.4))]))
-}
-
-fn velocity(bench: &mut Bench) -> Got {
-    with_velocity(bench)?;
-    velocity_is(bench, 0.4)
-}
-
-fn no_velocity(bench: &mut Bench) -> Got {
-    with_velocity(bench)?;
-    bench.command(&json!([{"positions": angles(bench), "time_from_start": {"sec": 0, "nanosec": 0}}]))?;
-    velocity_is(bench, 0.0)
-}
-
-fn wrong_velocity(bench: &mut Bench) -> Got {
-    with_velocity(bench)?;
-    let angles = angles(bench);
-    bench.command(&json!([point(&angles, &[0.7])]))?;
-    velocity_is(bench, 0.0)?;
-    bench.set_gains(SMALL, 0.0, 0.0)?;
-    position_is(bench, &angles)
 }
 
 /// Sends a trajectory after a valid one. The valid one must stay active.
@@ -111,52 +132,4 @@ fn stays(bench: &mut Bench, points: &serde_json::Value) -> Got {
     bench.command(&json!([point(&angles, &bench.each(0.0))]))?;
     bench.command(points)?;
     position_is(bench, &angles)
-}
-
-fn while_off(bench: &mut Bench) -> Got {
-    bench.float(SMALL, 0.0, 0.0)?;
-    bench.enable(false)?;
-    let angles = angles(bench);
-    bench.command(&json!([point(&angles, &bench.each(0.0))]))?;
-    bench.enable(true)?;
-    position_is(bench, &angles)
-}
-
-fn continuous(bench: &mut Bench) -> Got {
-    bench.fresh()?;
-    bench.forget("/joint_states");
-    let count = bench.messages_for("/joint_states", Duration::from_secs(1))?.len();
-    must(count >= 5, || format!("{count} messages"))?;
-    Ok(format!("{count} messages"))
-}
-
-fn names(bench: &mut Bench) -> Got {
-    let name = bench.fresh()?.name;
-    let mut distinct = name.clone();
-    distinct.sort();
-    distinct.dedup();
-    must(distinct.len() == bench.links && name.len() == bench.links, || format!("{name:?}"))?;
-    Ok(format!("{name:?}"))
-}
-
-fn parallel(bench: &mut Bench) -> Got {
-    bench.swing()?;
-    let states = bench.joints_for(0.2)?;
-    Ok(format!("{} messages with {} entries", states.len(), bench.links))
-}
-
-fn stamps(bench: &mut Bench) -> Got {
-    bench.fresh()?;
-    let mut last = f64::NEG_INFINITY;
-    for _ in 0..15 {
-        let msg = bench.message("/joint_states", Duration::from_secs(2))?;
-        let stamp = Joints::read(&msg)?.stamp;
-        let nanosec = msg.pointer("/header/stamp/nanosec").or_else(|| msg.pointer("/header/stamp/nsecs"));
-        let nanosec = nanosec.and_then(serde_json::Value::as_u64);
-        must(nanosec.is_some_and(|nanosec| nanosec < 1_000_000_000), || format!("nanosec {nanosec:?}"))?;
-        must(stamp >= last, || format!("{stamp} after {last}"))?;
-        last = stamp;
-    }
-    must(largest(&[last]).is_finite(), || "no stamp".to_owned())?;
-    Ok(format!("15 stamps, the last {last:.3} s"))
 }
