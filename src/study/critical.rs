@@ -17,7 +17,8 @@ pub const BEYOND: f64 = 1.1;
 /// The first unstable mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Critical {
-    /// Factor by which it grows in a step of [`BEYOND`] times the limit.
+    /// Factor by which it grows in a step of [`BEYOND`] times the limit. It is 1 if the growth is below rounding, or if
+    /// a joint only drifts.
     pub growth_per_step: f64,
     /// Its frequency \[Hz\]. If it changes sign at every step, this is half of the steps per second.
     pub frequency: f64,
@@ -45,7 +46,7 @@ pub(super) fn critical<const N: usize>(
         .max_by(|one, other| growth(one).total_cmp(&growth(other)))?;
     let (re, im) = (1.0 + period * fastest.re, period * fastest.im);
     let found = Critical {
-        growth_per_step: hypot(re, im),
+        growth_per_step: hypot(re, im).max(1.0),
         frequency: atan2(im.abs(), re) / (TAU * period),
         joint: furthest(&generator, fastest, linear.joints())?,
     };
