@@ -69,7 +69,7 @@ class Stability:
     worst_pose: Floats | None
     """The pose of `minimum_over_poses_held` [rad], (links,)."""
     critical: Critical | None
-    """The motion that grows there first."""
+    """The motion that grows there first; `None` if nothing grows 10 % beyond the limit."""
     timestep_limit_motion: float | None
     """The largest timestep at which the coming motion does not overflow; `None` if nothing moves."""
     motion_speed: float

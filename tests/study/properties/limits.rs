@@ -176,3 +176,17 @@ fn a_critical_motion_may_drift_or_grow_by_less_than_rounding() {
         assert_eq!(critical.growth_per_step, 1.0, "{case}: {critical:?}");
     }
 }
+
+/// Beyond a narrow unstable interval the loop is stable again.
+#[test]
+fn a_loop_that_is_stable_beyond_its_limit_has_no_critical_motion() {
+    let control = Dice::of(20_766).control::<2>();
+    let found = limits(&control);
+    let linear = Linear::at_pose(&control, &found.worst_pose.unwrap());
+    let radius = |part: f64| {
+        let h = part * found.minimum_held.unwrap();
+        step_matrix(&linear, control.method, Sampling::Held, h).spectral_radius()
+    };
+    assert!(radius(0.99) < 1.0 && radius(1.05) > 1.0 && radius(BEYOND) < 1.0);
+    assert_eq!(found.critical, None);
+}
