@@ -181,10 +181,8 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         (least, worst) = (Some(0.0), pose);
         limits.minimum_held = least;
     }
-    if let Some(limit) = least {
-        limits.worst_pose = Some(worst.pose);
-        limits.critical = critical(&worst.linear(&control), &control, limit);
-    }
+    limits.worst_pose = least.map(|_| worst.pose);
+    limits.critical = least.and_then(|limit| critical(&worst.linear(&control), &control, limit));
     if runaway.is_some() {
         return limits;
     }

@@ -106,10 +106,8 @@ impl Matrix {
         let (mut active, mut sweeps) = (self.n, 0);
         while active > 0 {
             let last = active - 1;
-            let first = (1..active)
-                .rev()
-                .find(|&i| self.is_negligible(i, sweeps, norm));
-            let first = first.unwrap_or(0);
+            let splits = |&i: &usize| self.is_negligible(i, sweeps, norm);
+            let first = (1..active).rev().find(splits).unwrap_or(0);
             match last - first {
                 0 => values[last] = Complex::real(self[(last, last)]),
                 1 => [values[first], values[last]] = self.pair(last),
