@@ -22,7 +22,7 @@ import { DEFAULTS } from "./settings.js";
  * @property {Question} question
  */
 
-/** A period 20 % to 25 % beyond the limit: the arm shakes, but its state stays finite [s]. @type {Record<number, number>} */
+/** A period about a quarter beyond the limit: the arm shakes, but its state stays finite [s]. @type {Record<number, number>} */
 export const BEYOND = { 2: 0.0055, 3: 0.0038 };
 /** A period well below the limit [s]. @type {Record<number, number>} */
 const WITHIN = { 2: 0.004, 3: 0.002 };

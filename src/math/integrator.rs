@@ -241,7 +241,8 @@ fn scaled<T: Arithmetic, const N: usize>(h: T, x: &[T; N]) -> [T; N] {
     entries!(h, i => h * x[i])
 }
 
+/// `x + h rate`.
 #[inline(always)]
-fn moved<T: Arithmetic, const N: usize>(x: &[T; N], h: T, rate: &[T; N]) -> [T; N] {
+pub(crate) fn moved<T: Arithmetic, const N: usize>(x: &[T; N], h: T, rate: &[T; N]) -> [T; N] {
     entries!(h, i => x[i] + h * rate[i])
 }

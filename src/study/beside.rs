@@ -41,7 +41,7 @@ impl<const N: usize> Steppable<N> for ContinuousLoop<N> {
     }
 
     fn evaluations(&self) -> u64 {
-        self.steps() * u64::from(self.control.method.evaluations())
+        self.steps * u64::from(self.control.method.evaluations())
     }
 
     fn state(&self) -> &State<N> {

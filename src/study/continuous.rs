@@ -24,7 +24,8 @@ pub struct ContinuousLoop<const N: usize> {
     pub integral: [f64; N],
     /// The rounding error of the state. It is carried into the next step, as in the live arm.
     carry: State<N>,
-    steps: u64,
+    /// Steps taken.
+    pub(super) steps: u64,
 }
 
 impl<const N: usize> ContinuousLoop<N> {
@@ -37,11 +38,6 @@ impl<const N: usize> ContinuousLoop<N> {
             carry: State::rest(),
             steps: 0,
         }
-    }
-
-    /// Steps taken.
-    pub fn steps(&self) -> u64 {
-        self.steps
     }
 
     fn acceleration(&self, q: &[f64; N], v: &[f64; N], integral: &[f64; N]) -> [f64; N] {
@@ -59,8 +55,6 @@ impl<const N: usize> ContinuousLoop<N> {
     pub fn step(&mut self) -> bool {
         let State { position, velocity } = self.state;
         let off = |i: usize| self.control.setpoint.position[i] - position[i];
-        let whole = both(&position, &self.integral);
-        let rates = both(&velocity, &std::array::from_fn(off));
         let (moved, changed) = increment(
             self.control.method,
             |_, x, rate| {
@@ -70,14 +64,13 @@ impl<const N: usize> ContinuousLoop<N> {
                 both(&a, &v.map(|v| -v))
             },
             0.0,
-            &whole,
-            &rates,
+            &both(&position, &self.integral),
+            &both(&velocity, &std::array::from_fn(off)),
             self.control.timestep,
         );
         let [dq, dv] = [moved, changed].map(|change| std::array::from_fn(|i| change[i]));
-        let (state, carry) = (&self.state, &self.carry);
-        let (position, position_carry) = add_carried(&state.position, &carry.position, &dq);
-        let (velocity, velocity_carry) = add_carried(&state.velocity, &carry.velocity, &dv);
+        let (position, position_carry) = add_carried(&position, &self.carry.position, &dq);
+        let (velocity, velocity_carry) = add_carried(&velocity, &self.carry.velocity, &dv);
         let next = State { position, velocity };
         let finite = next.is_finite();
         if finite {

@@ -29,17 +29,14 @@ pub struct ControlLoop<const N: usize> {
 
 impl<const N: usize> ControlLoop<N> {
     /// The loop, stepped by Runge-Kutta 4 at [`DEFAULT_TIMESTEP`].
-    pub const fn new(arm: Arm<N>, gains: Gains<N>, setpoint: Setpoint<N>) -> Self {
+    pub fn new(arm: Arm<N>, gains: Gains<N>, setpoint: Setpoint<N>) -> Self {
         Self {
             arm,
             gains,
             setpoint,
             method: Method::Rk4,
             timestep: DEFAULT_TIMESTEP,
-            period: ControlPeriod {
-                period: 0.0,
-                delay: false,
-            },
+            period: ControlPeriod::default(),
         }
     }
 
@@ -104,13 +101,9 @@ impl<const N: usize> ControlLoop<N> {
 
     /// Whether all gains are zero. The controller then has no effect even if it is enabled.
     #[must_use]
-    #[allow(
-        clippy::float_cmp,
-        reason = "only a gain of exactly zero has no effect"
-    )]
     pub fn is_free(&self) -> bool {
         let Gains { kp, ki, kd } = &self.gains;
-        kp.iter().chain(ki).chain(kd).all(|&gain| gain == 0.0)
+        kp.iter().chain(ki).chain(kd).all(|&gain| gain <= 0.0)
     }
 
     /// The joints that have an integral gain.

@@ -1,14 +1,14 @@
 //! The first unstable mode: the eigenvalue that leaves the unit circle at the limit, and the joint that moves most in
 //! it.
 //!
-//! **Invariant:** the work is bounded, and the result is `None` if a value is not finite.
+//! **Invariant:** the work is bounded, and the result is `None` if a value is not finite or nothing grows.
 
 use std::f64::consts::TAU;
 
 use super::control_loop::ControlLoop;
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix};
-use super::stability::{Modes, Sampling, Stepping};
+use super::stability::{Modes, NEUTRAL, Sampling, Stepping};
 use crate::math::elementary::{atan2, hypot};
 
 /// The loop is analysed at this multiple of its limit, since nothing grows at the limit itself.
@@ -17,7 +17,8 @@ pub const BEYOND: f64 = 1.1;
 /// The first unstable mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Critical {
-    /// Factor by which it grows in a step of [`BEYOND`] times the limit.
+    /// Factor by which it grows in a step of [`BEYOND`] times the limit. It is 1 if the growth is below rounding, or if
+    /// a joint only drifts.
     pub growth_per_step: f64,
     /// Its frequency \[Hz\]. If it changes sign at every step, this is half of the steps per second.
     pub frequency: f64,
@@ -37,7 +38,12 @@ pub(super) fn critical<const N: usize>(
     } else {
         Modes::of(linear).tiny()
     };
-    let generator = Stepping::of(linear, control, Sampling::Held).generator(period);
+    let stepping = Stepping::of(linear, control, Sampling::Held);
+    // Beyond a narrow unstable interval the loop is stable again.
+    if stepping.growth(period) < -NEUTRAL {
+        return None;
+    }
+    let generator = stepping.generator(period);
     let growth = |mu: &Complex| 2.0 * mu.re + period * mu.modulus() * mu.modulus();
     let fastest = generator
         .eigenvalues()
@@ -45,7 +51,7 @@ pub(super) fn critical<const N: usize>(
         .max_by(|one, other| growth(one).total_cmp(&growth(other)))?;
     let (re, im) = (1.0 + period * fastest.re, period * fastest.im);
     let found = Critical {
-        growth_per_step: hypot(re, im),
+        growth_per_step: hypot(re, im).max(1.0),
         frequency: atan2(im.abs(), re) / (TAU * period),
         joint: furthest(&generator, fastest, linear.joints())?,
     };

@@ -9,10 +9,11 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::control_loop::ControlLoop;
-use super::matrix::{Complex, Matrix, largest};
+use super::matrix::{Matrix, largest};
 use crate::math::arm::Arm;
 use crate::math::dynamics::{gravity_load, potential_energy};
-use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
+use crate::math::integrator::moved;
+use crate::math::pid::INTEGRAL_LIMIT;
 
 /// Most Newton steps of a search. From a nearby setpoint five are enough.
 const MAX_NEWTON: usize = 200;
@@ -53,14 +54,9 @@ pub struct Equilibrium<const N: usize> {
 /// and the sagging pose otherwise. A free arm hangs. An integral that would have to exceed its limit counts as a
 /// constant effort at the limit.
 pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
-    let ControlLoop {
-        arm,
-        gains,
-        setpoint,
-        ..
-    } = control;
+    let (gains, setpoint) = (&control.gains, &control.setpoint);
     if control.is_free() {
-        let is_heavy = arm.gravity() > 0.0;
+        let is_heavy = control.arm.gravity() > 0.0;
         return Equilibrium {
             position: if is_heavy {
                 hanging()
@@ -73,9 +69,7 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
         };
     }
     let mut descent = Descent {
-        arm,
-        gains,
-        setpoint,
+        control,
         integrating: control.integrating(),
         push: std::array::from_fn(|i| gains.kd[i] * setpoint.velocity[i]),
     };
@@ -102,7 +96,7 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
         }
         if !saturated {
             return Equilibrium {
-                position: std::array::from_fn(|i| setpoint.position[i] + sag[i]),
+                position: descent.position(&sag),
                 integral,
                 integrating: descent.integrating,
                 balanced,
@@ -113,9 +107,7 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
 
 /// The potential of the descent, as a function of the sag `y = q - q*` of the joints.
 struct Descent<'a, const N: usize> {
-    arm: &'a Arm<N>,
-    gains: &'a Gains<N>,
-    setpoint: &'a Setpoint<N>,
+    control: &'a ControlLoop<N>,
     integrating: [bool; N],
     /// Constant effort `kd q̇*`, and that of integrals at their limit \[N m\].
     push: [f64; N],
@@ -123,28 +115,29 @@ struct Descent<'a, const N: usize> {
 
 impl<const N: usize> Descent<'_, N> {
     fn position(&self, sag: &[f64; N]) -> [f64; N] {
-        std::array::from_fn(|i| self.setpoint.position[i] + sag[i])
+        std::array::from_fn(|i| self.control.setpoint.position[i] + sag[i])
     }
 
     /// `∂V/∂y`, joints that integrate included \[N m\].
     fn gradient(&self, sag: &[f64; N]) -> [f64; N] {
-        let load = gravity_load(self.arm, &self.position(sag));
-        std::array::from_fn(|i| load[i] + self.gains.kp[i] * sag[i] - self.push[i])
+        let load = gravity_load(&self.control.arm, &self.position(sag));
+        std::array::from_fn(|i| load[i] + self.control.gains.kp[i] * sag[i] - self.push[i])
     }
 
     fn potential(&self, sag: &[f64; N]) -> f64 {
         let spring: f64 = (0..N)
-            .map(|i| (0.5 * self.gains.kp[i] * sag[i] - self.push[i]) * sag[i])
+            .map(|i| (0.5 * self.control.gains.kp[i] * sag[i] - self.push[i]) * sag[i])
             .sum();
-        potential_energy(self.arm, &self.position(sag)) + spring
+        potential_energy(&self.control.arm, &self.position(sag)) + spring
     }
 
-    /// Size of the gradient over the joints that move.
-    fn slope(&self, sag: &[f64; N]) -> f64 {
-        let gradient = self.gradient(sag);
-        (0..N)
-            .filter(|&i| !self.integrating[i])
-            .fold(0.0, |max: f64, i| max.max(gradient[i].abs()))
+    /// The gradient of the joints that move; zero for the others.
+    fn slopes(&self, sag: &[f64; N]) -> [f64; N] {
+        let mut slopes = self.gradient(sag);
+        for i in (0..N).filter(|&i| self.integrating[i]) {
+            slopes[i] = 0.0;
+        }
+        slopes
     }
 
     /// Descends from zero sag to a pose in which the arm rests. Also returns whether zero sag is an unstable
@@ -158,7 +151,7 @@ impl<const N: usize> Descent<'_, N> {
             };
             let still = sag.iter().all(|sag| sag.abs() < BALANCED);
             balanced |= saddle == 0 && still;
-            let sides = [1.0, -1.0].map(|side| moved(&sag, &way, side * LEAVING));
+            let sides = [1.0, -1.0].map(|side| moved(&sag, side * LEAVING, &way));
             let [one, other] = sides.map(|side| self.potential(&side));
             sag = self.descend(sides[usize::from(other < one)]);
         }
@@ -172,20 +165,20 @@ impl<const N: usize> Descent<'_, N> {
     fn descend(&self, mut sag: [f64; N]) -> [f64; N] {
         let mut radius = TRUSTED;
         for _ in 0..MAX_NEWTON {
-            let slope = self.slope(&sag);
+            let slope = longest(&self.slopes(&sag));
             if slope == 0.0 {
                 break;
             }
             let stiffness = self.stiffness(&sag);
             let step = self.newton(&sag, &stiffness);
-            let length = step.iter().fold(0.0, |max: f64, step| max.max(step.abs()));
+            let length = longest(&step);
             let part = (radius / length).min(1.0);
-            let next = moved(&sag, &step, part);
+            let next = moved(&sag, part, &step);
             let height = self.potential(&sag);
             // Near the minimum the potential is constant within rounding, and only the gradient shows progress.
             let rounding = 1e-13 * (height.abs() + size(&stiffness));
             let drop = height - self.potential(&next);
-            if drop > rounding || (drop >= -rounding && self.slope(&next) < slope) {
+            if drop > rounding || (drop >= -rounding && longest(&self.slopes(&next)) < slope) {
                 sag = next;
                 radius = if part < 1.0 { 2.0 * radius } else { radius };
             } else if radius > SMALLEST_TRUSTED {
@@ -212,37 +205,31 @@ impl<const N: usize> Descent<'_, N> {
 
     /// `∂²V/∂y²` \[N m/rad\] of the joints that move; the others are decoupled, with 1 on the diagonal.
     fn stiffness(&self, sag: &[f64; N]) -> Matrix {
-        let gradient = gravity_gradient(self.arm, &self.position(sag));
+        let gradient = gravity_gradient(&self.control.arm, &self.position(sag));
         Matrix::from_fn(N, |i, j| {
             match (i == j, self.integrating[i] || self.integrating[j]) {
                 (true, true) => 1.0,
                 (false, true) => 0.0,
-                (_, false) => gradient[i.max(j)] + if i == j { self.gains.kp[i] } else { 0.0 },
+                (_, false) => {
+                    gradient[i.max(j)]
+                        + if i == j {
+                            self.control.gains.kp[i]
+                        } else {
+                            0.0
+                        }
+                }
             }
         })
     }
 
     fn newton(&self, sag: &[f64; N], stiffness: &Matrix) -> [f64; N] {
-        let gradient = self.gradient(sag);
-        let pull = (0..N).map(|i| {
-            if self.integrating[i] {
-                0.0
-            } else {
-                -gradient[i]
-            }
-        });
-        let pull: Vec<f64> = pull.collect();
+        let pull = self.slopes(sag).map(|slope| -slope);
         // Without curvature only the trust radius limits the step.
         let added = (-2.0 * least_curvature(stiffness)).max(1e-15 * size(stiffness));
         let step = stiffness.clone().plus_diagonal(added).solve(&pull);
         step.and_then(|step| step.try_into().ok())
             .unwrap_or([0.0; N])
     }
-}
-
-/// The point at `length` times the way.
-pub(crate) fn moved<const N: usize>(from: &[f64; N], way: &[f64; N], length: f64) -> [f64; N] {
-    std::array::from_fn(|i| from[i] + length * way[i])
 }
 
 /// The pose of the hanging arm \[rad\].
@@ -252,11 +239,13 @@ pub(crate) fn hanging<const N: usize>() -> [f64; N] {
 
 /// The smallest eigenvalue of a symmetric matrix.
 fn least_curvature(matrix: &Matrix) -> f64 {
-    let curvatures = matrix
-        .eigenvalues()
-        .into_iter()
-        .map(|Complex { re, .. }| re);
-    curvatures.fold(f64::INFINITY, f64::min)
+    let modes = matrix.eigenvalues().into_iter();
+    modes.map(|mode| mode.re).fold(f64::INFINITY, f64::min)
+}
+
+/// The largest magnitude of an entry.
+fn longest<const N: usize>(way: &[f64; N]) -> f64 {
+    way.iter().fold(0.0, |max, entry| max.max(entry.abs()))
 }
 
 /// The largest magnitude on the diagonal of a matrix.
@@ -267,5 +256,5 @@ fn size(matrix: &Matrix) -> f64 {
 /// `∂G_k/∂q_j` is entry `max(k, j)` of this \[N m/rad\]. Turning any joint up to `k` turns all links beyond `k` by the
 /// same angle. The derivative is therefore the load of the arm turned by a quarter of a turn.
 pub(crate) fn gravity_gradient<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> [f64; N] {
-    gravity_load(arm, &moved(q, &hanging(), -1.0))
+    gravity_load(arm, &moved(q, -1.0, &hanging()))
 }

@@ -11,10 +11,8 @@
 //!
 //! **Invariant:** the returned number of steps was run and was enough, and the number of runs is bounded.
 
-/// Up to this number of steps every number is tried.
 const ALL: u64 = 256;
 
-/// Trials between half of the best number so far and that number.
 const NEIGHBOURS: u64 = 16;
 
 /// A run with any number of steps.

@@ -2,8 +2,8 @@
 //!
 //! The default gains are scaled to the arm. A joint's gains scale with the inertia `J` that it moves, and with the
 //! speed factor `σ` of the loop: `kp ~ J σ²`, `ki ~ J σ³`, `kd ~ J σ`. The loop's motion is then `σ` times as fast. The
-//! inertia of a joint is that of all links beyond it. If a heavy outer link drags a light inner one, it is the
-//! effective inertia at the joint while the others are free. Weighted means of the two are tried in turn (`SHAPES`).
+//! inertia of a joint is a mean of two: that of all links beyond it, and the effective inertia while the others are
+//! free, which counts if a heavy outer link drags a light inner one. Several weights (`SHAPES`) are tried in turn.
 //!
 //! A speed factor is accepted if the smallest timestep limit over all poses leaves the margin. The simulated arm,
 //! stepped like the live one, must also settle in time in each of [`MOVES`] moves. The result is the smallest accepted
@@ -37,12 +37,8 @@ pub const MAX_STEPS: f64 = 1e6;
 /// Duration of a move, in settling times: a settled arm must stay settled.
 const SETTLING_TIMES: f64 = 1.5;
 
-/// Two weights: for springs and integrals, and for damping.
-type Shape = (f64, f64);
-
-/// Weights of the effective inertia at a joint while the others are free. The rest of the weight is on the inertia of
-/// all links beyond it.
-const SHAPES: [Shape; 6] = [
+/// Weights of the effective inertia: for springs and integrals, and for damping.
+const SHAPES: [(f64, f64); 6] = [
     (0.0, 0.0),
     (0.5, 0.5),
     (0.25, 0.5),
@@ -124,16 +120,12 @@ pub async fn search_gains<const N: usize>(
             control.gains = scaled(&control.arm, shape, pace);
             let limits = limits::search_limits(control).await;
             let limit = limits.trusted();
-            let is_unstable = limit == Some(0.0);
             let is_short = limit.is_some_and(|limit| limit < requirements.margin * timestep);
             // The loop is too fast, or its springs hardly hold the load. Some faster loops decide which.
-            if is_short && !is_unstable && paces >= SOFT_PACES {
+            if is_short && limit > Some(0.0) && paces >= SOFT_PACES {
                 break;
             }
-            if !is_short
-                && !is_unstable
-                && let Some(settled_after) = settle(&control, settling_time).await
-            {
+            if !is_short && let Some(settled_after) = settle(&control, settling_time).await {
                 return Ok(SuggestedGains {
                     gains: control.gains,
                     limit,
@@ -148,7 +140,7 @@ pub async fn search_gains<const N: usize>(
 }
 
 /// The default gains, scaled to an arm's inertia and to a speed factor.
-fn scaled<const N: usize>(arm: &Arm<N>, (springs, damping): Shape, pace: f64) -> Gains<N> {
+fn scaled<const N: usize>(arm: &Arm<N>, (springs, damping): (f64, f64), pace: f64) -> Gains<N> {
     let Gains { kp, ki, kd } = Gains::<N>::default();
     let scaled = |gains: [f64; N], weight: f64, power: i32| {
         let here = inertia(arm, weight);
@@ -164,7 +156,7 @@ fn scaled<const N: usize>(arm: &Arm<N>, (springs, damping): Shape, pace: f64) ->
 
 /// The first speed factor to try: the larger of two values. With one an arm like the default one settles in time. With
 /// the other the springs hold the load and the integrals carry it.
-fn slowest_pace<const N: usize>(arm: &Arm<N>, shape: Shape, settling_time: f64) -> f64 {
+fn slowest_pace<const N: usize>(arm: &Arm<N>, shape: (f64, f64), settling_time: f64) -> f64 {
     let Gains { kp, ki, .. } = scaled(arm, shape, 1.0);
     let load = gravity_load(arm, &[0.0; N]);
     let carries = (0..N).map(|i| {

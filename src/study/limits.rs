@@ -83,7 +83,7 @@ pub struct Limits<const N: usize> {
     pub certified: bool,
     /// The pose of `minimum_held` \[rad\]; `None` where nothing limits.
     pub worst_pose: Option<[f64; N]>,
-    /// The motion that grows there first.
+    /// The motion that grows there first; `None` if nothing grows 10 % beyond the limit.
     pub critical: Option<Critical>,
     /// [`ADVISED_PART`] of the smallest over all poses, the live arm's way: of `minimum_held` if that is certified, or
     /// of the bound if that is less and still useful. If the loop is unstable in some pose, neither applies. Then it is
@@ -181,10 +181,8 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         (least, worst) = (Some(0.0), pose);
         limits.minimum_held = least;
     }
-    if let Some(limit) = least {
-        limits.worst_pose = Some(worst.pose);
-        limits.critical = critical(&worst.linear(&control), &control, limit);
-    }
+    limits.worst_pose = least.map(|_| worst.pose);
+    limits.critical = least.and_then(|limit| critical(&worst.linear(&control), &control, limit));
     if runaway.is_some() {
         return limits;
     }

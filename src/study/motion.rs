@@ -20,8 +20,8 @@
 //! The peak speed of a single joint released at rest is `e √(kp/I)` without damping and `kp e / kd` with strong
 //! damping. In between the error of the formula is at most a tenth.
 //!
-//! Springs are uneven if the undamped frequencies of the joints differ by more than a factor of 4. A strong
-//! joint then throws the links behind a weak one, which reach up to five times the sum of the peaks.
+//! Springs are uneven if the undamped frequencies of the joints differ by more than a factor of 4. A strong joint then
+//! throws the links behind a weak one, which reach up to five times the sum of the peaks.
 //!
 //! The limits were measured on 2,100 random arms of 2 and 3 links, spun or falling for 4 s. Two in a hundred diverged
 //! slightly below these angles, and half of them were stable at 2.5 times as much. On moves of up to 25 rad per joint,

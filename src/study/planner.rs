@@ -139,10 +139,9 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
             reference: &reference,
             control,
             best: None,
-            has_run: false,
         };
         fewest(least, affordable, u64::MAX, &mut trials).await;
-        has_run |= trials.has_run;
+        has_run |= least.max(1) <= affordable;
         candidates.extend(trials.best);
     }
     candidates.sort_by_key(|one| std::cmp::Reverse(one.evaluations));
@@ -168,12 +167,10 @@ struct MethodTrials<'a, const N: usize> {
     control: ControlLoop<N>,
     /// The last run that was accurate enough.
     best: Option<Candidate>,
-    has_run: bool,
 }
 
 impl<const N: usize> StepTrial for &mut MethodTrials<'_, N> {
     async fn is_enough(&mut self, steps: u64) -> bool {
-        self.has_run = true;
         let (reference, method) = (self.reference, self.control.method);
         let timestep = reference.whole / in_f64(steps);
         let control = self.control.with_timestep(timestep);
@@ -287,7 +284,7 @@ impl<const N: usize> Reference<N> {
     }
 }
 
-/// Whether the reference is the loop whose law acts at every instant.
+/// Whether the law of the reference acts at every instant.
 fn has_ideal<const N: usize>(control: &ControlLoop<N>) -> bool {
     !control.is_free() && control.given_period() == 0.0
 }

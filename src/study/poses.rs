@@ -65,9 +65,9 @@ impl<const N: usize> PoseCandidate<N> {
     }
 }
 
-/// The smallest limit of all poses and of a known one \[s\], with its pose; `None` if there is no limit. A pose that is
-/// unstable in continuous time has a limit of zero. Without `sampling` such a pose is sought, and no other. The search
-/// pauses after every pose.
+/// The smallest limit of all poses and of a known one \[s\], with its pose; `None` if there is no limit. Without
+/// `sampling` only a pose that is unstable in continuous time is sought; its limit is zero. The search pauses after
+/// every pose.
 pub(super) async fn smallest_of_all_poses<const N: usize>(
     control: ControlLoop<N>,
     sampling: Option<Sampling>,

@@ -166,8 +166,9 @@ impl<const N: usize> Proof<N> {
 
     /// Halves a box along its widest angle.
     fn split(&mut self, [middle, mut half]: Angles<N>) {
-        let widest = (1..N).max_by(|&i, &j| half[i].total_cmp(&half[j]));
-        let widest = widest.unwrap_or(0);
+        let widest = (1..N)
+            .max_by(|&i, &j| half[i].total_cmp(&half[j]))
+            .unwrap_or(0);
         half[widest] *= 0.5;
         for side in [-1.0, 1.0] {
             let mut middle = middle;
@@ -370,9 +371,6 @@ fn dominating<const N: usize>(
 /// The most by which gravity changes each spring's stiffness. Entry (i, j) of Γ is the load of joint `max(i, j)` of the
 /// turned arm.
 fn heaviest<const N: usize>(arm: &Arm<N>, gains: &Gains<N>) -> [f64; N] {
-    if arm.gravity() == 0.0 {
-        return [0.0; N];
-    }
     let load = |j: usize| (j..N).map(|i| weight_moment(arm, i)).sum::<f64>();
     dominating(|i, j| load(i.max(j)), |j| gains.kp[j])
 }

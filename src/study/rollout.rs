@@ -250,11 +250,8 @@ impl<const N: usize> Rollout<N> {
             && references.iter().all(|one| !one.is_lost)
         {
             let poses = references.each_ref().map(|it| it.state().position);
-            let pairs = poses
-                .iter()
-                .flat_map(|one| poses.iter().map(move |it| (one, it)));
-            let apart = pairs.map(|(one, other)| largest_difference(one, other));
-            let spread = SPREAD * largest(apart);
+            let apart = |one| largest(poses.iter().map(|other| largest_difference(one, other)));
+            let spread = SPREAD * largest(poses.iter().map(|one| apart(one)));
             let error = largest_difference(&state.position, &poses[0]);
             deviation.take(error, spread.max(last_digit));
         }

@@ -12,7 +12,6 @@
 
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix};
-use crate::math::elementary::hypot;
 
 /// A mode is slow if its rate is below this part of the fastest rate.
 const SLOWER: f64 = 1e-4;
@@ -36,27 +35,26 @@ pub(super) fn grows(linear: &Linear, modes: &[Complex], rate: f64, doubtful: f64
         return false;
     }
     let flow = linear.flow();
-    let sizes = modes.iter().map(|mode| mode.modulus());
-    let slow = shifted_modes(&flow, 0.0).into_iter();
-    let mut sizes = sizes.chain(slow.map(|(re, im)| hypot(re, im)));
-    sizes.any(|size| {
-        let modes = shifted_modes(&flow, SHIFT * size);
-        modes.into_iter().any(|(re, im)| {
-            let modulus = hypot(re, im);
+    let sizes = [modes, &shifted_modes(&flow, 0.0)].concat();
+    sizes.into_iter().map(Complex::modulus).any(|size| {
+        shifted_modes(&flow, SHIFT * size).into_iter().any(|mode| {
+            let modulus = mode.modulus();
             let keeps_digits = modulus > size / NEAR && modulus < NEAR * size;
-            keeps_digits && is_slow(modulus, re) && re > GROWTH * modulus
+            keeps_digits && is_slow(modulus, mode.re) && mode.re > GROWTH * modulus
         })
     })
 }
 
-/// Real and imaginary parts of the modes, from the eigenvalues of the shifted inverse; empty if the matrix is singular.
-fn shifted_modes(flow: &Matrix, shift: f64) -> Vec<(f64, f64)> {
+/// The modes, from the eigenvalues of the shifted inverse; empty if the matrix is singular.
+fn shifted_modes(flow: &Matrix, shift: f64) -> Vec<Complex> {
     let inverse = flow.clone().plus_diagonal(-shift).inverse();
     let times = inverse.map_or_else(Vec::new, |inverse| inverse.eigenvalues());
     let mode = |time: Complex| {
         let modulus = time.modulus();
-        let parts = [time.re, -time.im].map(|part| part / modulus / modulus);
-        (shift + parts[0], parts[1])
+        Complex {
+            re: shift + time.re / modulus / modulus,
+            im: -time.im / modulus / modulus,
+        }
     };
     times.into_iter().map(mode).collect()
 }

@@ -23,7 +23,7 @@ use super::control_loop::ControlLoop;
 pub use super::critical::{BEYOND, Critical};
 pub use super::limits::{ADVISED_PART, Limits, Rest, limit_held, limits, search_limits};
 use super::linear::Linear;
-use super::matrix::{Complex, Matrix, largest};
+use super::matrix::{Complex, Matrix, largest, largest_above};
 pub use super::proof::most_bytes;
 use super::slow_modes;
 use crate::math::integrator::Method;
@@ -58,15 +58,6 @@ pub enum Sampling {
 impl Sampling {
     /// Both.
     pub const ALL: [Self; 2] = [Self::Held, Self::Continuous];
-
-    /// `held` or `continuous`.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Held => "held",
-            Self::Continuous => "continuous",
-        }
-    }
 }
 
 /// The largest stable timestep of a linear loop \[s\]: see [`Limits`] for `None` and zero.
@@ -129,7 +120,7 @@ pub struct Stepping<'a> {
     sampling: Sampling,
     /// Steps of the method in one control period.
     substeps: u32,
-    /// Whether an effort acts one period late.
+    /// Whether a held effort acts one period late.
     delayed: bool,
     /// The matrix of the stepped system: the loop, or the arm with constant efforts.
     stepped: Matrix,
@@ -167,7 +158,7 @@ impl<'a> Stepping<'a> {
         sampling: Sampling,
     ) -> Self {
         Self {
-            delayed: control.period.delay && sampling == Sampling::Held,
+            delayed: control.period.delay,
             ..Self::new(linear, control.method, sampling)
         }
     }
@@ -235,16 +226,9 @@ impl<'a> Stepping<'a> {
         if fastest == 0.0 {
             return 0.0;
         }
-        values
-            .iter()
-            .map(|mu| (2.0 * mu.re + period * mu.modulus() * mu.modulus()) / fastest)
-            .fold(f64::NEG_INFINITY, |max, growth| {
-                if growth > max || growth.is_nan() {
-                    growth
-                } else {
-                    max
-                }
-            })
+        let growth = |mu: Complex| 2.0 * mu.re + period * mu.modulus() * mu.modulus();
+        let growths = values.into_iter().map(|mu| growth(mu) / fastest);
+        largest_above(f64::NEG_INFINITY, growths)
     }
 
     /// Whether no mode grows at this period. NaN counts as unstable.
@@ -263,7 +247,7 @@ impl<'a> Stepping<'a> {
         if modes.slow_growth {
             return Some(0.0);
         }
-        let start = SEARCH_START / rate;
+        let start = modes.tiny();
         if !self.is_stable(start) {
             // A loop with almost no damping may still be stable at periods a thousand times shorter. It must decay
             // there. A loop that only seems neutral may grow too slowly to be detected, as an undamped swing does under

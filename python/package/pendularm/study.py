@@ -32,7 +32,7 @@ class Critical:
     """The motion that grows first in the worst pose, 10 % beyond the limit."""
 
     growth_per_step: float
-    """Factor by which it grows in a step."""
+    """Factor by which it grows in a step; 1 if the growth is below rounding, or if a joint only drifts."""
     frequency: float
     """Its frequency [Hz]; half of the steps per second if it changes its sign at every step."""
     joint: int
@@ -69,7 +69,7 @@ class Stability:
     worst_pose: Floats | None
     """The pose of `minimum_over_poses_held` [rad], (links,)."""
     critical: Critical | None
-    """The motion that grows there first."""
+    """The motion that grows there first; `None` if nothing grows 10 % beyond the limit."""
     timestep_limit_motion: float | None
     """The largest timestep at which the coming motion does not overflow; `None` if nothing moves."""
     motion_speed: float

@@ -21,12 +21,11 @@ use super::task::{Task, TaskRun};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{forward_dynamics, mass_matrix};
-use crate::math::integrator::Method;
+use crate::math::integrator::{Method, moved};
 use crate::math::pid::{Gains, Setpoint};
 use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::{ControlLoop, no_control};
-use crate::study::equilibrium::moved;
 use crate::study::linear::{Linear, gravity_gradient};
 use crate::study::matrix::{Matrix, largest, largest_difference};
 use crate::study::stability::{Sampling, largest_timestep};
@@ -190,7 +189,7 @@ impl TaskRun for Implicit {
     fn advance(&mut self, steps: u64) -> u64 {
         for taken in 0..steps {
             let change = (self.step)(self).unwrap_or([f64::NAN; 4]);
-            self.y = moved(&self.y, &change, 1.0);
+            self.y = moved(&self.y, 1.0, &change);
             if !self.y.iter().all(|y| y.is_finite()) {
                 return taken;
             }
@@ -238,10 +237,10 @@ impl Implicit {
         let (mut k, jacobian) = self.jacobian();
         let newton = jacobian.scaled(-0.5 * h).plus_diagonal(1.0);
         for _ in 0..MAX_ITERATIONS {
-            let f = self.slope(&moved(&y, &k, 0.5 * h));
+            let f = self.slope(&moved(&y, 0.5 * h, &k));
             let left: Vec<f64> = (0..4).map(|i| f[i] - k[i]).collect();
             let change: Whole = newton.solve(&left)?.try_into().ok()?;
-            k = moved(&k, &change, 1.0);
+            k = moved(&k, 1.0, &change);
             if (0..4).all(|i| (h * change[i]).abs() <= 1e-13 * (1.0 + y[i].abs())) {
                 break;
             }
@@ -263,9 +262,9 @@ impl Implicit {
         };
         let k1 = stage(&start, &[0.0; 4])?;
         let k2 = stage(&start, &k1.map(|k| 4.0 * k))?;
-        let f3 = self.slope(&moved(&y, &k1, 2.0));
+        let f3 = self.slope(&moved(&y, 2.0, &k1));
         let k3 = stage(&f3, &std::array::from_fn(|i| k1[i] - k2[i]))?;
-        let ahead = moved(&moved(&y, &k1, 2.0), &k3, 1.0);
+        let ahead = moved(&moved(&y, 2.0, &k1), 1.0, &k3);
         let f4 = self.slope(&ahead);
         let others = std::array::from_fn(|i| k1[i] - k2[i] - 8.0 / 3.0 * k3[i]);
         let k4 = stage(&f4, &others)?;

@@ -59,6 +59,8 @@ fn map(section: &mut Section) {
     let (mut cells, mut disagreeing, mut undecided) = (0, 0, 0);
     let all = Sampling::ALL.map(|sampling| Method::ALL.map(|method| (method, sampling)));
     for (method, sampling) in all.into_iter().flatten() {
+        let is_held = sampling == Sampling::Held;
+        let name = if is_held { "held" } else { "continuous" };
         let control = |factor| stiffened(factor).with_method(method);
         let (mut predicted, mut measured) = (Vec::new(), Vec::new());
         for factor in &factors {
@@ -82,12 +84,11 @@ fn map(section: &mut Section) {
             let first = growth.iter().position(|growth| !decays(*growth));
             let edge = first.filter(|first| *first > 0 && limit > 0.0);
             measured.extend(edge.and_then(|first| timestep_edges.get(first)).map(|h| {
-                let note = format!("{}, predicted {}", sampling.name(), seconds(limit));
+                let note = format!("{name}, predicted {}", seconds(limit));
                 Point::new(*h, *factor, note)
             }));
         }
         let key = Key::of(method).marked(Marker::None);
-        let is_held = sampling == Sampling::Held;
         let key = if is_held { key } else { key.dashed() };
         plot.add(Curve::line(key, predicted));
         plot.add(Curve::dots(Key::of(method), measured));

@@ -189,16 +189,18 @@ impl Complex {
 
 /// The largest difference of two entries in the same place; NaN if one is.
 pub(crate) fn largest_difference(one: &[f64], other: &[f64]) -> f64 {
-    largest(
-        one.iter()
-            .zip(other)
-            .map(|(one, other)| (one - other).abs()),
-    )
+    let pairs = one.iter().zip(other);
+    largest(pairs.map(|(one, other)| (one - other).abs()))
 }
 
-/// The largest of `values`; NaN if one of them is.
+/// The largest of `values` and 0; NaN if one of them is.
 pub fn largest(values: impl Iterator<Item = f64>) -> f64 {
-    values.fold(0.0, |max, value| {
+    largest_above(0.0, values)
+}
+
+/// The largest of `values` and `least`; NaN if one of them is.
+pub(super) fn largest_above(least: f64, values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(least, |max, value| {
         if value > max || value.is_nan() {
             value
         } else {

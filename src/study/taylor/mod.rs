@@ -104,9 +104,8 @@ impl<T: Precision, const N: usize> Drive<T, N> for [T; N] {
 /// A motion in progress, with compensated rounding errors.
 #[derive(Debug, Clone)]
 pub(crate) struct Taylor<T, const N: usize> {
-    pub(crate) position: [T; N],
-    pub(crate) velocity: [T; N],
-    carry: [[T; N]; 2],
+    pub(crate) state: State<N, T>,
+    carry: State<N, T>,
     tolerance: f64,
     /// Order of the series, except at the end of a span.
     order: usize,
@@ -125,11 +124,14 @@ pub(crate) struct Taylor<T, const N: usize> {
 
 impl<T: Precision, const N: usize> Taylor<T, N> {
     /// An arm in the given state. A step leaves out at most `tolerance` times the way that the joints turn in it.
-    pub(crate) fn new(position: [T; N], velocity: [T; N], tolerance: f64, order: usize) -> Self {
+    pub(crate) fn new(state: State<N, T>, tolerance: f64, order: usize) -> Self {
+        let nothing = [T::default(); N];
         Self {
-            position,
-            velocity,
-            carry: [[T::default(); N]; 2],
+            state,
+            carry: State {
+                position: nothing,
+                velocity: nothing,
+            },
             tolerance,
             order,
             cuts: 1.0,
@@ -151,7 +153,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
     pub(crate) fn step(&mut self, arm: &Arm<N>, drive: &impl Drive<T, N>) {
         let (span, rest) = (self.span, self.rest);
         let whole = (span / self.cuts).min(rest.0);
-        let (position, velocity) = (self.position, self.velocity);
+        let State { position, velocity } = self.state;
         let effort = drive.efforts(&position, &velocity);
         let acceleration = T::acceleration(arm, &position, &velocity, &effort);
         let directions = T::directions(&position);
@@ -188,10 +190,14 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
             real(h)
         };
         let (dq, dv) = self.series.change(time);
-        let [position, velocity] = &mut self.carry;
+        let State {
+            position: q,
+            velocity: v,
+        } = &mut self.state;
+        let carry = &mut self.carry;
         for i in 0..N {
-            (self.position[i], position[i]) = self.position[i].plus_carried(position[i], dq[i]);
-            (self.velocity[i], velocity[i]) = self.velocity[i].plus_carried(velocity[i], dv[i]);
+            (q[i], carry.position[i]) = q[i].plus_carried(carry.position[i], dq[i]);
+            (v[i], carry.velocity[i]) = v[i].plus_carried(carry.velocity[i], dv[i]);
         }
         let (left, lost) = two_sum(rest.0, -h);
         self.rest = if is_last {
@@ -246,10 +252,7 @@ fn size<T: Precision, const N: usize>(x: &[T; N]) -> f64 {
 
 /// The motion of an arm under constant efforts, in doubles.
 #[derive(Debug, Clone)]
-pub struct TaylorReference<const N: usize> {
-    taylor: Taylor<f64, N>,
-    state: State<N>,
-}
+pub struct TaylorReference<const N: usize>(Taylor<f64, N>);
 
 impl<const N: usize> TaylorReference<N> {
     /// The motion from the given state, computed to rounding.
@@ -261,28 +264,24 @@ impl<const N: usize> TaylorReference<N> {
     /// held between [`ROUNDING`] and 1.
     pub fn within(state: State<N>, tolerance: f64) -> Self {
         let tolerance = tolerance.clamp(ROUNDING, 1.0);
-        let State { position, velocity } = state;
-        Self {
-            taylor: Taylor::new(position, velocity, tolerance, order_for(tolerance)),
-            state,
-        }
+        Self(Taylor::new(state, tolerance, order_for(tolerance)))
     }
 
     /// The same motion with its steps divided by this factor.
     #[must_use]
     pub(super) fn cut(mut self, cuts: u32) -> Self {
-        self.taylor.cuts = f64::from(cuts);
+        self.0.cuts = f64::from(cuts);
         self
     }
 
     /// The arm's state.
     pub fn state(&self) -> &State<N> {
-        &self.state
+        &self.0.state
     }
 
     /// Number of series coefficients so far. Each costs about as much as an evaluation of the dynamics.
     pub fn coefficients(&self) -> u64 {
-        self.taylor.coefficients
+        self.0.coefficients
     }
 
     /// Follows the arm under `effort` \[N m\] for `span` \[s\]; `false` if the motion could not be computed. The state
@@ -300,17 +299,15 @@ impl<const N: usize> TaylorReference<N> {
         piece: &mut PieceWork,
     ) -> bool {
         let bound = self.coefficients().saturating_add(MAX_COEFFICIENTS);
-        self.taylor.begin(span);
-        while self.taylor.rest.0 > 0.0 {
-            if self.coefficients() > bound || !self.state.is_finite() {
+        self.0.begin(span);
+        while self.0.rest.0 > 0.0 {
+            if self.coefficients() > bound || !self.state().is_finite() {
                 return false;
             }
             let before = self.coefficients();
-            self.taylor.step(arm, effort);
-            self.state.position = self.taylor.position;
-            self.state.velocity = self.taylor.velocity;
+            self.0.step(arm, effort);
             piece.spend(self.coefficients() - before).await;
         }
-        self.state.is_finite()
+        self.state().is_finite()
     }
 }

@@ -49,7 +49,7 @@ impl<const N: usize> Law<N> {
 }
 
 /// Joint angles \[rad\] and rates \[rad/s\] with 106 bits.
-type Exact<const N: usize> = ([Real; N], [Real; N]);
+type Exact<const N: usize> = State<N, Real>;
 
 /// A control law with its integral \[rad s\] at the start of a step.
 struct ExactLaw<const N: usize> {
@@ -88,11 +88,11 @@ impl<const N: usize> ExactLaw<N> {
     }
 
     /// The shipped law at a control instant: moves the integral on by a period \[s\], and returns the effort.
-    fn held(&mut self, (position, velocity): &Exact<N>, period: f64) -> [Real; N] {
-        let error = self.error(position);
+    fn held(&mut self, state: &Exact<N>, period: f64) -> [Real; N] {
+        let error = self.error(&state.position);
         self.integral =
             std::array::from_fn(|i| (self.integral[i] + error[i] * period).clamp(INTEGRAL_LIMIT));
-        self.effort(&error, &self.integral, &self.rate(velocity))
+        self.effort(&error, &self.integral, &self.rate(&state.velocity))
     }
 
     /// Moves the integral on by a step \[s\] from `position`.
@@ -131,10 +131,10 @@ impl<const N: usize> Drive<Real, N> for ExactLaw<N> {
 }
 
 fn exact<const N: usize>(start: &State<N>) -> Exact<N> {
-    (
-        start.position.map(Real::from),
-        start.velocity.map(Real::from),
-    )
+    State {
+        position: start.position.map(Real::from),
+        velocity: start.velocity.map(Real::from),
+    }
 }
 
 /// A step of a motion.
@@ -189,8 +189,7 @@ fn follow<const N: usize>(
     (tolerance, order): (f64, usize),
 ) -> Vec<Piece<N>> {
     let left = |taylor: &Taylor<Real, N>| Real::from(taylor.rest.0) + taylor.rest.1;
-    let (position, velocity) = exact(start);
-    let mut taylor = Taylor::new(position, velocity, tolerance, order);
+    let mut taylor = Taylor::new(exact(start), tolerance, order);
     let mut exact_law = ExactLaw::of(law);
     let (spans, span) = match law {
         Law::Held { period, .. } => (steps_in(duration, *period).round().max(1.0), *period),
@@ -202,12 +201,12 @@ fn follow<const N: usize>(
         let end = Real::from(span) * done;
         let held = match law {
             Law::Constant(effort) => Some(effort.map(Real::from)),
-            Law::Held { .. } => Some(exact_law.held(&(taylor.position, taylor.velocity), span)),
+            Law::Held { .. } => Some(exact_law.held(&taylor.state, span)),
             Law::Continuous(..) => None,
         };
         taylor.begin(span);
         while taylor.rest.0 > 0.0 {
-            let (before, position) = (left(&taylor), taylor.position);
+            let (before, position) = (left(&taylor), taylor.state.position);
             match &held {
                 Some(effort) => taylor.step(arm, effort),
                 None => taylor.step(arm, &exact_law),
@@ -258,7 +257,7 @@ pub fn exact_acceleration<const N: usize>(
     state: &State<N>,
     tau: &[f64; N],
 ) -> [DoubleDouble; N] {
-    let (position, velocity) = exact(state);
+    let State { position, velocity } = exact(state);
     Real::acceleration(arm, &position, &velocity, &tau.map(Real::from))
 }
 
@@ -291,13 +290,13 @@ pub fn exact_steps<const N: usize>(
             Law::Continuous(..) | Law::Held { .. } => held.held(state, h),
         };
         let acceleration = |_, q: &[Real; N], v: &[Real; N]| Real::acceleration(arm, q, v, &effort);
-        let (q, v) = &state;
+        let (q, v) = (&state.position, &state.velocity);
         let (dq, dv) = increment(method, acceleration, Real::ZERO, q, v, Real::from(h));
-        *state = (plus(q, &dq), plus(v, &dv));
+        (state.position, state.velocity) = (plus(q, &dq), plus(v, &dv));
     };
     let sample = |_| {
         (0..every).for_each(|_| step(&mut state));
-        state
+        (state.position, state.velocity)
     };
     (0..count).map(sample).collect()
 }
