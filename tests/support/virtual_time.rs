@@ -3,7 +3,8 @@
 //!
 //! The clock moves only when everything waits for it, so a time that a test reads is exact to the timers' millisecond.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
+use std::net::SocketAddr;
 use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
 use std::sync::Arc;
@@ -11,6 +12,7 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::Interest;
 use pendularm::actors::resources::gauges::Gauges;
@@ -51,6 +53,15 @@ impl Gateway {
         let registry = Registry::new(Arc::clone(&gauges)).start();
         registry.send(Attach(nodes)).await.expect("a registry");
         Self { registry, gauges }
+    }
+
+    /// The client's end of a new connection under these conditions. Its pipe holds `room` bytes each way.
+    pub fn open(&self, admission: Arc<Admission>, room: usize) -> DuplexStream {
+        let (ours, theirs) = duplex(room);
+        let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
+        let local = SocketAddr::from(([127, 0, 0, 1], 9095));
+        Connection::start_with(admission, local, theirs, registry, gauges);
+        ours
     }
 
     /// A client whose pipe holds `room` bytes each way.
@@ -122,6 +133,21 @@ impl Peer {
 /// Runs all work that needs no virtual time, or almost none.
 pub async fn settle() {
     sleep(Duration::from_millis(10)).await;
+}
+
+/// The number of turns of other tasks during `doing`, and its result.
+pub async fn turns_of_others<T>(doing: impl Future<Output = T>) -> (usize, T) {
+    let turns = Rc::new(Cell::new(0));
+    let counted = Rc::clone(&turns);
+    let others = actix_rt::spawn(async move {
+        loop {
+            counted.set(counted.get() + 1);
+            tokio::task::yield_now().await;
+        }
+    });
+    let done = doing.await;
+    others.abort();
+    (turns.get(), done)
 }
 
 /// A node that keeps received calls unanswered.

@@ -14,6 +14,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::arm_steps::pause;
+use crate::stage::stand_in;
 use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
@@ -52,23 +53,6 @@ enum Answer {
 }
 
 type Log = Arc<Mutex<Vec<Said>>>;
-
-/// Replaces the registry.
-struct TickEar(Log);
-
-impl Actor for TickEar {
-    type Context = Context<Self>;
-}
-
-impl Handler<Publish> for TickEar {
-    type Result = ();
-
-    fn handle(&mut self, publish: Publish, _: &mut Context<Self>) {
-        if publish.topic == Topic::JointStates {
-            self.0.lock().unwrap().push(Said::Tick);
-        }
-    }
-}
 
 /// Replaces a client.
 struct Client {
@@ -109,7 +93,12 @@ struct TurnsBench {
 impl TurnsBench {
     async fn new() -> Self {
         let said = Log::default();
-        let publish = TickEar(Arc::clone(&said)).start().recipient();
+        let ticks = Arc::clone(&said);
+        let publish = stand_in(move |publish: Publish| {
+            if publish.topic == Topic::JointStates {
+                ticks.lock().unwrap().push(Said::Tick);
+            }
+        });
         let gauges = Arc::new(Gauges::default());
         let arm = ArmSim::new(Arm::default(), Gains::default(), publish, gauges).start();
         let topic = Topic::JointStates;

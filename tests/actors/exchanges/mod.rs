@@ -12,6 +12,7 @@
 //! | `a < pattern` | the next frame that `a` receives matches |
 //! | `a << pattern` | a later frame matches; the frames before it are dropped |
 //! | `a ~ text` | the frame that `a` received last contains this text, byte by byte |
+//! | `a told text` | client `a` sends this frame, and the next frame that it receives is a status that informs it |
 //! | `a listen topic` | subscribes to a topic and receives the confirmation |
 //! | `a call service args = pattern` | the call succeeds, and its values match |
 //! | `a refused service args = text` | the call fails with a status that contains this text |
@@ -33,6 +34,7 @@
 //! | `steps = 1`, `params = 1` | this many calls are kept |
 //! | `answer steps json` | the oldest of them succeeds with these values, or with none, and ends; `reply` leaves it open until `release`, `refuse steps why` refuses it, `lose steps` drops it, and `gone steps` drops it if its client has left |
 //! | `connections = 1`, `dropped = 1`, `taken = 1` | clients that are served, messages that were dropped, permits for long frames that are taken |
+//! | `workers busy`, `workers free` | from here on all threads for long frames and for lists are occupied, or free |
 //! | `shutting down`, `finish all` | the two messages by which the runtime ends its clients |
 //! | `floating` | gravity and gains are zero and the controller is on: an arm at rest stays where it is |
 //! | `for x \| y in 1 \| a; 2 \| b` | the steps up to `end` run once for each row, with its values in place of `@x` and `@y` |
@@ -56,7 +58,6 @@ mod patterns;
 mod peer;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -66,9 +67,9 @@ use self::peer::{LONG_PATIENCE, Peer, SHORT_PATIENCE, ask};
 use crate::nodes::{start_whole, work_in_this_thread};
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
-use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::messages::{FinishAll, RefuseCalls};
+use pendularm::actors::resources::long_work::{PLACES, WorkKind, WorkPermit};
 use pendularm::actors::resources::memory::Memory;
 use pendularm::options::{Options, Parsed};
 use pendularm::protocol::catalog::{Rosapi, Service};
@@ -76,7 +77,7 @@ use pendularm::protocol::catalog::{Rosapi, Service};
 use pendularm::web::Site;
 use pendularm_client::pipe;
 use serde_json::{Value, json};
-use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
+use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 use tokio::time::{Instant, advance, sleep, timeout};
 
 /// Longest virtual time until a frame arrives after others.
@@ -128,6 +129,8 @@ struct World {
     bound: BTreeMap<String, Value>,
     kept: KeptCalls,
     marked: Instant,
+    /// The places for long work that are occupied.
+    busy: Vec<WorkPermit>,
 }
 
 impl World {
@@ -153,19 +156,12 @@ impl World {
             bound: BTreeMap::new(),
             kept,
             marked: Instant::now(),
+            busy: Vec::new(),
         }
     }
 
-    /// The client's end of a new connection, whose pipe holds `room` bytes each way.
     fn open(&self, room: usize) -> DuplexStream {
-        let (ours, theirs) = duplex(room);
-        let (registry, gauges) = (
-            self.gateway.registry.clone(),
-            Arc::clone(&self.gateway.gauges),
-        );
-        let local = SocketAddr::from(([127, 0, 0, 1], 9095));
-        Connection::start_with(Arc::clone(&self.admission), local, theirs, registry, gauges);
-        ours
+        self.gateway.open(Arc::clone(&self.admission), room)
     }
 
     async fn connect(&self, name: &str, room: usize) -> Peer {
@@ -251,10 +247,20 @@ impl World {
                 }
             }
             "connections" | "dropped" | "taken" | "steps" | "params" => {
-                self.kept.count(&self.gateway, name, rest)?;
+                self.kept
+                    .count(&self.gateway, name, &expand(rest, &self.bound))?;
             }
             "answer" | "reply" | "refuse" | "lose" | "gone" => self.kept.decide(name, rest).await?,
             "release" => self.kept.release().await,
+            "workers" => {
+                self.busy.clear();
+                for kind in [WorkKind::Long, WorkKind::Listing].repeat(PLACES) {
+                    if rest == "busy" {
+                        self.busy.extend(WorkPermit::take(kind).await);
+                    }
+                }
+                settle().await;
+            }
             "shutting" => {
                 let refuse = RefuseCalls("shutting down");
                 let sent = self.gateway.registry.send(refuse).await;
@@ -312,8 +318,10 @@ impl World {
             }
             "~" if peer.last.contains(rest) => {}
             "~" => return Err(format!("not in {}", peer.last)),
-            "listen" => {
-                peer.send(&json!({"op": "subscribe", "topic": rest}).to_string())
+            "listen" | "told" => {
+                let subscribe = json!({"op": "subscribe", "topic": rest}).to_string();
+                let told = expand(rest, &self.bound);
+                peer.send(if verb == "told" { &told } else { &subscribe })
                     .await;
                 let got = peer.next().await?;
                 check(
@@ -497,6 +505,11 @@ fn frames_in_pieces_and_malformed_frames() {
 }
 
 #[test]
+fn messages_in_pieces_and_long_frames() {
+    play("encodings");
+}
+
+#[test]
 fn names_and_ids() {
     play("names");
 }
@@ -534,6 +547,11 @@ fn goals_of_inverse_kinematics() {
 #[test]
 fn trials() {
     play("trials");
+}
+
+#[test]
+fn clocks_and_the_estimated_error() {
+    play("clocks");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Going, json_of, refusal, said};
+use super::{Going, json_of, said};
 use crate::common::Runtime;
 
 #[test]
@@ -42,22 +42,5 @@ fn a_goal_is_followed_to_its_end_and_a_signal_cancels_it() {
     assert!(
         complaint.ends_with("\npendularm: the goal ended as CANCELED\n"),
         "{complaint}"
-    );
-
-    said(
-        &runtime,
-        &["service", "call", "/pid_controller/enable", "[true]"],
-    );
-    let refused = |goal: &[&str]| refusal(&runtime, &[&["action", "send"], goal].concat(), 1);
-    assert_eq!(
-        refused(&["/nothing", "{}"]),
-        "action: no action is called /nothing"
-    );
-    let far = refused(&["/ik_action", "{x: 9, y: 0}"]);
-    assert!(far.contains("beyond the arm's reach"), "{far}");
-    let other = refused(&["/ik_action", "std_msgs/msg/String", "{}"]);
-    assert_eq!(
-        other,
-        format!("/ik_action is of type {typed}, not std_msgs/msg/String")
     );
 }

@@ -170,20 +170,6 @@ fn a_closed_pipe_ends_a_command_without_an_error() {
     }
 }
 
-/// Every write to `/dev/full` fails.
-#[cfg(target_os = "linux")]
-#[test]
-fn an_output_error_is_no_success() {
-    let runtime = Runtime::start();
-    let full = fs::File::options().write(true).open("/dev/full").unwrap();
-    let output = common::program()
-        .args(["topic", "list", "--connect", &runtime.address.to_string()])
-        .stdout(full)
-        .output()
-        .unwrap();
-    assert!(complaint(&output, 1).contains("standard output: "));
-}
-
 #[test]
 fn the_pages_of_help_have_examples_and_the_exit_statuses() {
     for command in COMMANDS {

@@ -1,4 +1,4 @@
-//! The command line as beginners type it: unknown fields, addresses in any form, the controller still off.
+//! The command line as beginners type it: unknown fields, and the controller still off.
 
 use serde_json::json;
 
@@ -101,47 +101,5 @@ fn a_command_that_moves_the_arm_hints_that_the_controller_is_off() {
     said(&runtime, &["service", "call", ENABLE, "{data: true}"]);
     for command in commands {
         said(&runtime, command);
-    }
-}
-
-#[test]
-fn an_address_has_any_form_and_any_place() {
-    let runtime = Runtime::start();
-    let port = runtime.address.port();
-    let output = |words: &[&str]| common::program().args(words).output().unwrap();
-    for address in [
-        format!("{port}"),
-        format!(":{port}"),
-        format!("localhost:{port}"),
-        format!("ws://127.0.0.1:{port}/"),
-        format!("http://127.0.0.1:{port}/?token=none"),
-    ] {
-        for words in [
-            &["topic", "--connect", &address, "list"][..],
-            &["topic", "list", "--connect", &address],
-        ] {
-            let said = output(words);
-            let words = format!("{words:?}: {}", String::from_utf8_lossy(&said.stderr));
-            assert!(said.stdout.starts_with(b"/"), "{words}");
-        }
-    }
-    let address = port.to_string();
-    let before = [
-        "topic",
-        "--json",
-        "--timeout",
-        "60",
-        "--token",
-        "no-token-is-asked-for",
-        "--connect",
-        &address,
-    ];
-    let said = output(&[&before[..], &["list"]].concat());
-    assert!(said.stdout.starts_with(b"{\"name\":\"/"), "{said:?}");
-    for words in [&["plan", "--error", "1"][..], &["topic", "list"]] {
-        let said = output(&[&["--connect", &address], words].concat());
-        let complaint = String::from_utf8(said.stderr).unwrap();
-        assert_eq!(said.status.code(), Some(2), "{complaint}");
-        assert!(complaint.contains("--connect"), "{complaint}");
     }
 }

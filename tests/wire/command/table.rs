@@ -3,7 +3,8 @@
 //! A paragraph begins with `# ` and its statement, and uses its own runtime. A row is an exit status, the arguments as
 //! a shell reads them, ` = ` and a part of the output. With ` == ` it is the whole output. Both may have the escapes of
 //! JSON. A successful command writes nothing to standard error. A failed one writes one line there and nothing else.
-//! `%3*x%` is `xxx`. A row that begins with `!` has no address of the runtime.
+//! `%3*x%` is `xxx`. A row that begins with `!` has no address of the runtime other than `$ADDRESS`, whose port is
+//! `$PORT`.
 
 use super::ask;
 use crate::common::{self, Runtime};
@@ -35,6 +36,8 @@ fn expand(word: &str) -> String {
 
 /// The fault of a row, if it has one.
 fn fault(runtime: &Runtime, row: &str) -> Option<String> {
+    let row = &row.replace("$ADDRESS", &runtime.address.to_string());
+    let row = &row.replace("$PORT", &runtime.address.port().to_string());
     let (status, rest) = row.split_once(' ').unwrap();
     let (arguments, part) = rest.split_once(" =").expect(row);
     let is_whole = part.starts_with('=');
