@@ -1,5 +1,4 @@
-//! Fields are read one by one, and rejected by name: absent, null, within an object, by position, repeated, refused by another
-//! layer. Bad literals are the rows of `tests/actors/refusals/`.
+//! Fields are read one by one, and rejected by name: refused by another layer, and bounded in length. Bad literals are the rows of `tests/actors/refusals/`.
 //!
 //! **Invariant:** statuses are compared in full, because a client receives only them.
 
@@ -28,36 +27,6 @@ fn reading<T>(
     let value = read(&mut fields);
     assert_eq!(fields.accepted(), fields.status().is_empty());
     (value, fields.status())
-}
-
-#[test]
-fn members_of_an_object_are_read_like_fields_and_named_after_it() {
-    let read = |args: &str| {
-        reading(Service::Stability, args, |fields| {
-            fields.object("params", |params| {
-                let gravity = params.number("gravity", Bound::NonNegative);
-                (gravity, params.numbers("masses", 2, Bound::Positive))
-            })
-        })
-    };
-    let (value, status) = read(r#"{"params":{"gravity":2,"masses":[1,2],"colour":"red"}}"#);
-    assert_eq!(value, Some((Some(2.0), Some(vec![1.0, 2.0]))));
-    assert_eq!(status, "");
-    let (value, status) = read(r#"{"params":{"gravity":-2,"masses":[1,1e999]}}"#);
-    assert_eq!(value, Some((None, None)));
-    assert_eq!(
-        status,
-        "params.gravity must be at least 0, got -2; params.masses[1] must be a finite number"
-    );
-    assert_eq!(read(r#"{"params":{"gravity":null}}"#).0, Some((None, None)));
-    for absent in ["{}", r#"{"params":null}"#] {
-        assert_eq!(read(absent), (None, String::new()));
-    }
-    let (value, status) = read(r#"{"params":[1]}"#);
-    assert_eq!(
-        (value, status.as_str()),
-        (None, "params must be an object, got an array")
-    );
 }
 
 #[test]

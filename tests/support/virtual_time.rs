@@ -4,10 +4,13 @@
 //! The clock moves only when everything waits for it, so a time that a test reads is exact to the timers' millisecond.
 
 use std::cell::{Cell, RefCell};
+use std::io::{self, IoSlice};
 use std::net::SocketAddr;
 use std::ops::{Deref, DerefMut};
+use std::pin::Pin;
 use std::rc::Rc;
 use std::sync::Arc;
+use std::task::{self, Poll};
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -21,7 +24,7 @@ use pendularm::actors::wire::{Caller, Nodes, ServiceCall, TopicMessage};
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm_client::pipe::Client;
 use serde_json::{Value, json};
-use tokio::io::{AsyncReadExt, DuplexStream, duplex};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, DuplexStream, ReadBuf, duplex};
 use tokio::time::{Instant, sleep};
 
 /// Longer than any wait of a test.
@@ -148,6 +151,66 @@ pub async fn turns_of_others<T>(doing: impl Future<Output = T>) -> (usize, T) {
     let done = doing.await;
     others.abort();
     (turns.get(), done)
+}
+
+type OnBytes = Box<dyn FnMut(&[u8])>;
+
+/// A pipe that shows bytes to closures: after they are read, and before they are written.
+pub struct Watched {
+    stream: DuplexStream,
+    pub on_read: OnBytes,
+    pub on_write: OnBytes,
+}
+
+impl Watched {
+    pub fn new(stream: DuplexStream) -> Self {
+        Self {
+            stream,
+            on_read: Box::new(|_| ()),
+            on_write: Box::new(|_| ()),
+        }
+    }
+}
+
+impl AsyncRead for Watched {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut task::Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let before = buffer.filled().len();
+        let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
+        (self.on_read)(&buffer.filled()[before..]);
+        polled
+    }
+}
+
+impl AsyncWrite for Watched {
+    fn poll_write(
+        self: Pin<&mut Self>,
+        cx: &mut task::Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        self.poll_write_vectored(cx, &[IoSlice::new(bytes)])
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        cx: &mut task::Context<'_>,
+        slices: &[IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        let bytes: Vec<u8> = slices.iter().flat_map(|slice| slice.to_vec()).collect();
+        (self.on_write)(&bytes);
+        Pin::new(&mut self.stream).poll_write(cx, &bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut task::Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut task::Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
 }
 
 /// A node that keeps received calls unanswered.

@@ -36,11 +36,11 @@ const TURNS_PER_TICK: usize = 17;
 /// Turns after which a test gives up.
 const MANY_TURNS: usize = 1_000_000;
 
-/// All messages of the arm, in order.
-#[derive(Debug, Clone, PartialEq)]
-enum Said {
-    Tick,
-    Answer(u64, Answer),
+/// What the arm has sent: a number of ticks, and answers to clients, in order.
+#[derive(Default)]
+struct Said {
+    ticks: usize,
+    answers: Vec<(u64, Answer)>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +52,7 @@ enum Answer {
     Other,
 }
 
-type Log = Arc<Mutex<Vec<Said>>>;
+type Log = Arc<Mutex<Said>>;
 
 /// Replaces a client.
 struct Client {
@@ -75,8 +75,8 @@ impl<T: 'static> Asker<T> for Client {
                 }
             }
         };
-        let said = Said::Answer(self.number, answer);
-        self.log.lock().unwrap().push(said);
+        let said = (self.number, answer);
+        self.log.lock().unwrap().answers.push(said);
     }
 
     fn is_gone(&self) -> bool {
@@ -96,7 +96,7 @@ impl TurnsBench {
         let ticks = Arc::clone(&said);
         let publish = stand_in(move |publish: Publish| {
             if publish.topic == Topic::JointStates {
-                ticks.lock().unwrap().push(Said::Tick);
+                ticks.lock().unwrap().ticks += 1;
             }
         });
         let gauges = Arc::new(Gauges::default());
@@ -113,7 +113,7 @@ impl TurnsBench {
         bench.ask(0, pause(true));
         bench.ask(0, Reset::default());
         bench.until_answers(2).await;
-        bench.said.lock().unwrap().clear();
+        *bench.said.lock().unwrap() = Said::default();
         bench
     }
 
@@ -158,23 +158,11 @@ impl TurnsBench {
     }
 
     fn answered(&self) -> usize {
-        let said = self.said.lock().unwrap();
-        let answers = said.iter().filter(|one| **one != Said::Tick);
-        answers.count()
+        self.said.lock().unwrap().answers.len()
     }
 
     fn answers(&self) -> Vec<(u64, Answer)> {
-        let said = self.said.lock().unwrap();
-        let answers = said.iter().filter_map(|one| match one {
-            Said::Answer(client, answer) => Some((*client, answer.clone())),
-            Said::Tick => None,
-        });
-        answers.collect()
-    }
-
-    fn ticks(&self) -> usize {
-        let said = self.said.lock().unwrap();
-        said.iter().filter(|one| **one == Said::Tick).count()
+        self.said.lock().unwrap().answers.clone()
     }
 
     /// Asserts that the ticks of this number of turns have arrived. One may still be missing.
@@ -182,7 +170,7 @@ impl TurnsBench {
     fn assert_ticks(&self, turns: usize, of: &str) {
         let expected = turns / TURNS_PER_TICK;
         assert!(expected >= 3, "{of}: only {turns} turns");
-        let ticks = self.ticks();
+        let ticks = self.said.lock().unwrap().ticks;
         assert!(
             ticks + 1 >= expected,
             "{of}: {ticks} ticks in {turns} turns"

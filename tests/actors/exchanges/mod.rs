@@ -38,6 +38,7 @@
 //! | `shutting down`, `finish all` | the two messages by which the runtime ends its clients |
 //! | `floating` | gravity and gains are zero and the controller is on: an arm at rest stays where it is |
 //! | `for x \| y in 1 \| a; 2 \| b` | the steps up to `end` run once for each row, with its values in place of `@x` and `@y` |
+//! | `for x in 1; 2 do step` | the same for this one step |
 //! | `for x in 0..9` | the same for each number, without the last, which may be a limit |
 //! | `for x in` | the same for each row of the lines below it, which begin with `\| ` |
 //!
@@ -387,6 +388,10 @@ fn unroll(mut steps: &[Step]) -> Vec<Step> {
             all.push(step.clone());
             continue;
         };
+        let (header, only) = match header.split_once(" do ") {
+            Some((header, only)) => (header, Some([(step.0, only.to_owned())])),
+            None => (header, None),
+        };
         let (names, rows) = header.split_once(" in").expect("a loop has values");
         let count = steps.iter().take_while(|(_, line)| line.starts_with("| "));
         let (below, rest) = steps.split_at(count.count());
@@ -400,17 +405,24 @@ fn unroll(mut steps: &[Step]) -> Vec<Step> {
         };
         let mut depth = 1;
         let ends = |(_, line): &Step| {
-            depth += i32::from(line.starts_with("for ")) - i32::from(line == "end");
+            let begins = line.starts_with("for ") && !line.contains(" do ");
+            depth += i32::from(begins) - i32::from(line == "end");
             depth == 0
         };
-        let length = rest.iter().position(ends).expect("a loop has an end");
+        let (body, rest) = match &only {
+            Some(only) => (&only[..], rest),
+            None => {
+                let length = rest.iter().position(ends).expect("a loop has an end");
+                (&rest[..length], &rest[length + 1..])
+            }
+        };
         for row in rows {
             let values: Vec<(&str, &str)> = names.split(" | ").zip(row.split(" | ")).collect();
-            let body = rest[..length].iter();
+            let body = body.iter();
             let body = body.map(|(number, line)| (*number, replace(line, &values)));
             all.extend(unroll(&body.collect::<Vec<_>>()));
         }
-        steps = &rest[length + 1..];
+        steps = rest;
     }
     all
 }
@@ -484,108 +496,44 @@ fn play(file: &str) {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-#[test]
-fn topics_of_clients() {
-    play("topics");
+/// A test for each file.
+macro_rules! exchanges {
+    ($($(#[$only:meta])* $name:ident: $file:literal,)+) => {
+        $(
+            $(#[$only])*
+            #[test]
+            fn $name() {
+                play($file);
+            }
+        )+
+    };
 }
 
-#[test]
-fn services_of_clients() {
-    play("services");
-}
-
-#[test]
-fn actions_of_clients_and_of_the_runtime() {
-    play("actions");
-}
-
-#[test]
-fn frames_in_pieces_and_malformed_frames() {
-    play("frames");
-}
-
-#[test]
-fn messages_in_pieces_and_long_frames() {
-    play("encodings");
-}
-
-#[test]
-fn names_and_ids() {
-    play("names");
-}
-
-#[test]
-fn rosapi_and_parameters() {
-    play("rosapi");
-}
-
-#[test]
-fn messages_and_refusals_of_the_arm() {
-    play("arm");
-}
-
-#[test]
-fn calls_and_ends_of_connections() {
-    play("connections");
-}
-
-#[test]
-fn room_for_what_is_long() {
-    play("memory");
-}
-
-#[test]
-fn places_and_the_way_to_them() {
-    play("places");
-}
-
-#[test]
-fn goals_of_inverse_kinematics() {
-    play("goals");
-}
-
-#[test]
-fn trials() {
-    play("trials");
-}
-
-#[test]
-fn clocks_and_the_estimated_error() {
-    play("clocks");
-}
-
-#[test]
-fn paths() {
-    play("paths");
-}
-
-#[test]
-fn frames_for_web_viewers() {
-    play("tf_web");
-}
-
-#[cfg(feature = "web")]
-#[test]
-fn exchanges_over_websocket() {
-    play("web");
-}
-
-#[cfg(feature = "web")]
-#[test]
-fn life_and_ends_of_websockets() {
-    play("sockets");
-}
-
-#[cfg(feature = "web")]
-#[test]
-fn heads_of_requests() {
-    play("heads");
-}
-
-#[cfg(feature = "web")]
-#[test]
-fn requests_over_http() {
-    play("http");
+exchanges! {
+    topics_of_clients: "topics",
+    services_of_clients: "services",
+    actions_of_clients_and_of_the_runtime: "actions",
+    frames_in_pieces_and_malformed_frames: "frames",
+    messages_in_pieces_and_long_frames: "encodings",
+    names_and_ids: "names",
+    rosapi_and_parameters: "rosapi",
+    messages_and_refusals_of_the_arm: "arm",
+    calls_and_ends_of_connections: "connections",
+    room_for_what_is_long: "memory",
+    places_and_the_way_to_them: "places",
+    goals_of_inverse_kinematics: "goals",
+    trials: "trials",
+    clocks_and_the_estimated_error: "clocks",
+    paths: "paths",
+    frames_for_web_viewers: "tf_web",
+    #[cfg(feature = "web")]
+    exchanges_over_websocket: "web",
+    #[cfg(feature = "web")]
+    life_and_ends_of_websockets: "sockets",
+    #[cfg(feature = "web")]
+    heads_of_requests: "heads",
+    #[cfg(feature = "web")]
+    requests_over_http: "http",
 }
 
 /// Under either prefix, and with or without the leading slash.
