@@ -30,26 +30,26 @@ fn reading<T>(
 }
 
 #[test]
-fn a_reason_given_from_outside_for_a_member_names_it_with_its_object() {
-    let (_, status) = reading(Service::Rollout, r#"{"gains":{}}"#, |fields| {
-        fields.object("gains", |gains| gains.refuse("kp", &"is not to my taste"))
+fn another_layer_may_refuse_a_field_or_a_member_in_its_own_words() {
+    let (rejections, status) = reading(Service::Rollout, r#"{"gains":{}}"#, |fields| {
+        fields.refuse("samples", &"is not to be trusted");
+        fields.object("gains", |gains| gains.refuse("kp", &"is not to my taste"));
+        fields.rejections().to_vec()
     });
-    assert_eq!(status, "gains.kp is not to my taste");
-}
-
-#[test]
-fn another_layer_may_refuse_a_field_in_its_own_words() {
-    let args = args("{}");
-    let mut fields = Fields::read(&args, Service::SetIntegrator).unwrap();
-    fields.refuse("method", &"is not to be trusted");
-    assert!(!fields.accepted());
-    assert_eq!(fields.status(), "method is not to be trusted");
+    let refused = |field: &str, why: &str| RejectedField {
+        field: field.to_owned(),
+        reason: Reason::Refused(why.to_owned()),
+    };
     assert_eq!(
-        fields.rejections(),
-        [RejectedField {
-            field: "method".to_owned(),
-            reason: Reason::Refused("is not to be trusted".to_owned()),
-        }]
+        rejections,
+        [
+            refused("samples", "is not to be trusted"),
+            refused("gains.kp", "is not to my taste"),
+        ]
+    );
+    assert_eq!(
+        status,
+        "samples is not to be trusted; gains.kp is not to my taste"
     );
 }
 

@@ -41,12 +41,6 @@ pub(super) fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-pub(super) fn end(mut runtime: Runtime) {
-    signal(runtime.pid(), "TERM");
-    let status = runtime.end().0;
-    assert!(status.success());
-}
-
 #[test]
 fn a_run_is_recorded_whole_and_replayed() {
     let folder = Folder::new("record-whole");
@@ -60,7 +54,7 @@ fn a_run_is_recorded_whole_and_replayed() {
         client.message("/joint_states");
     }
     client.ask("/arm_sim/reset", json!({}));
-    end(runtime);
+    runtime.stop();
 
     let (passages, ending) = passages(&file);
     assert_eq!(ending, RecordEnding::Whole);
@@ -87,7 +81,7 @@ fn each_channel_has_the_quality_of_service_that_rosbag2_plays_it_with() {
     client.ask("/arm_sim/pause", json!({"data": true}));
     client.subscribe("/joint_states");
     client.message("/joint_states");
-    end(runtime);
+    runtime.stop();
     let summary = mcap::Summary::read(&fs::read(&file).unwrap())
         .unwrap()
         .unwrap();
@@ -150,7 +144,7 @@ fn a_record_of_another_version_is_replayed_with_a_note() {
     for _ in 0..10 {
         client.message("/joint_states");
     }
-    end(runtime);
+    runtime.stop();
     let ours = env!("PENDULARM_VERSION");
     let recorded = fs::read(&file).unwrap();
     assert!(!run(&["replay", text(&file)]).1.contains("note:"));
@@ -295,7 +289,7 @@ fn without_a_folder_clients_neither_begin_nor_end_a_record() {
         let status = refused["status"].as_str().unwrap();
         assert!(status.contains("--record-dir"), "{status}");
     }
-    end(runtime);
+    runtime.stop();
     assert_eq!(passages(&file).1, RecordEnding::Whole);
 }
 
@@ -311,7 +305,7 @@ fn the_operators_record_is_not_ended_by_a_client() {
         "operators.mcap was started by the operator with --record, and ends with the program"
     );
     client.ask("/arm_sim/pause", json!({"data": true}));
-    end(runtime);
+    runtime.stop();
     assert_eq!(passages(&file).1, RecordEnding::Whole);
     assert!(holds_call(&file, "{\"data\":true}"));
 }

@@ -8,14 +8,14 @@ use serde_json::{Value, json};
 
 use crate::common::Runtime;
 use crate::folder::Folder;
-use crate::record::{end, passages, run, text};
+use crate::record::{passages, run, text};
 
 /// Records a run with one call.
 fn record(file: &Path) {
     let runtime = Runtime::with(&["--record", text(file)]);
     let mut client = runtime.connect();
     client.ask("/arm_sim/pause", json!({"data": true}));
-    end(runtime);
+    runtime.stop();
 }
 
 /// Writes a record that has the first input of the one in `file`, and then this.

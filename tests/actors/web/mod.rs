@@ -7,7 +7,6 @@
 
 mod http;
 mod messages;
-mod unread;
 
 use std::sync::Arc;
 use std::time::Duration;
