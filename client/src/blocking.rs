@@ -49,11 +49,10 @@ impl Client {
     #[must_use]
     #[track_caller]
     pub fn web(address: SocketAddr) -> Self {
-        let opened = Self::dial(Framing::WebSocket, address, PATIENCE).and_then(|mut client| {
-            client.shake_hands(&handshake(&address.to_string(), "/", ""))?;
-            Ok(client)
-        });
-        expect("a WebSocket", opened)
+        expect(
+            "a WebSocket",
+            Self::connect(Framing::WebSocket, address, PATIENCE),
+        )
     }
 
     /// Connects, with `patience` as the limit of every wait.
@@ -65,14 +64,6 @@ impl Client {
         address: SocketAddr,
         patience: Duration,
     ) -> Result<Self, Error> {
-        let mut client = Self::dial(framing, address, patience)?;
-        if framing == Framing::WebSocket {
-            client.shake_hands(&handshake(&address.to_string(), "/", ""))?;
-        }
-        Ok(client)
-    }
-
-    fn dial(framing: Framing, address: SocketAddr, patience: Duration) -> Result<Self, Error> {
         let dial = || {
             let stream = TcpStream::connect_timeout(&address, patience)?;
             stream.set_nodelay(true)?;
@@ -80,7 +71,7 @@ impl Client {
             stream.set_write_timeout(Some(patience))?;
             Ok(stream)
         };
-        Ok(Self {
+        let mut client = Self {
             stream: dial().map_err(Error::Socket)?,
             codec: Codec::new(framing),
             patience,
@@ -88,20 +79,19 @@ impl Client {
             calls: 0,
             has_closed: false,
             kept: Vec::new(),
-        })
-    }
-
-    fn shake_hands(&mut self, request: &str) -> Result<(), Error> {
-        self.write(request.as_bytes())?;
-        let deadline = Instant::now() + self.patience;
-        loop {
-            // The runtime sends nothing before a request of the client.
-            self.codec.next_event()?;
-            if self.codec.is_open() {
-                return Ok(());
-            }
-            self.read(deadline)?;
+        };
+        if framing == Framing::WebSocket {
+            client.write(handshake(&address.to_string(), "/", "").as_bytes())?;
         }
+        let deadline = Instant::now() + patience;
+        while !client.codec.is_open() {
+            // The runtime sends nothing before a request of the client.
+            client.codec.next_event()?;
+            if !client.codec.is_open() {
+                client.read(deadline)?;
+            }
+        }
+        Ok(client)
     }
 
     /// The socket, for violations of the protocol.
@@ -213,14 +203,8 @@ impl Client {
     /// If none arrives, or if it is not JSON.
     pub fn next_frame(&mut self, deadline: Instant) -> Result<Value, Error> {
         loop {
-            match self.next_event(deadline)? {
-                Event::Text(text) => {
-                    return serde_json::from_str(&text)
-                        .map_err(|error| Error::Malformed(format!("{error} in {text:?}")));
-                }
-                Event::Pong(_) => {}
-                Event::Close(..) => return Err(Error::Ended),
-                event => return Err(Error::Malformed(format!("{event:?} instead of a frame"))),
+            if let Some(frame) = self.next_event(deadline)?.into_frame()? {
+                return Ok(frame);
             }
         }
     }

@@ -2,6 +2,8 @@
 //!
 //! **Invariant:** the reader is strict: a frame that no server may send is an error.
 
+use serde_json::Value;
+
 use crate::Error;
 use crate::websocket::{ACCEPT, LAST, append, opcode};
 
@@ -27,6 +29,23 @@ pub enum Event {
     Pong(Vec<u8>),
     /// The end of a WebSocket: its code, if it has one, and its reason.
     Close(Option<u16>, String),
+}
+
+impl Event {
+    /// The frame of a text, or `None` for a ping or a pong.
+    ///
+    /// # Errors
+    /// [`Error::Ended`] for a close, and [`Error::Malformed`] if it is no frame.
+    pub fn into_frame(self) -> Result<Option<Value>, Error> {
+        match self {
+            Self::Text(text) => serde_json::from_str(&text)
+                .map(Some)
+                .map_err(|error| Error::Malformed(format!("{error} in {text:?}"))),
+            Self::Ping(_) | Self::Pong(_) => Ok(None),
+            Self::Close(..) => Err(Error::Ended),
+            Self::Binary(_) => Err(Error::Malformed(format!("{self:?} instead of a frame"))),
+        }
+    }
 }
 
 /// One end of a connection: the received bytes, and the encoder of frames.

@@ -149,14 +149,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
     /// If none arrives, or if it is not a frame.
     pub async fn next_frame(&mut self) -> Result<Value, Error> {
         loop {
-            let text = match self.next_event().await? {
-                Event::Text(text) => text,
-                Event::Ping(_) | Event::Pong(_) => continue,
-                Event::Close(..) => return Err(Error::Ended),
-                event => return Err(Error::Malformed(format!("{event:?} instead of a frame"))),
+            let Some(frame) = self.next_event().await?.into_frame()? else {
+                continue;
             };
-            let frame: Value = serde_json::from_str(&text)
-                .map_err(|error| Error::Malformed(format!("{error} in {text:?}")))?;
             if self.remembers {
                 self.received.push(frame.clone());
             }

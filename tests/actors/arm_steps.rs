@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::stage::{Published, Stage, asked, ms};
+use crate::stage::{Stage, asked, ms, publisher};
 use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{ArmSim, Enable, Pause, SetIntegrator, WAKE_UP_BUDGET};
@@ -63,7 +63,7 @@ fn steps_left_by_a_wake_up_are_taken_before_the_next_tick() {
 fn nothing_is_encoded_for_a_topic_without_subscribers() {
     in_virtual_time(async {
         let (sender, mut published) = unbounded_channel();
-        let publish = Published(sender).start().recipient();
+        let publish = publisher(sender);
         let arm = ArmSim::<2>::new(Arm::default(), Gains::default(), publish, Arc::default());
         let arm = arm.start();
         sleep(ms(3000)).await;

@@ -1,18 +1,15 @@
-//! Thousands of calls and goals that end at one instant: other tasks still have turns. Registrations that end.
+//! Thousands of calls and goals that end at one instant: other tasks still have turns.
 //!
 //! **Invariant:** the share of other tasks is counted in their turns.
 
-use std::cell::Cell;
-use std::rc::Rc;
 use std::time::Duration;
 
 use crate::system::in_virtual_time;
-use crate::virtual_time::{Gateway, Peer, WIDE, settle};
-use pendularm::actors::gateway::messages::TakeCensus;
+use crate::virtual_time::{Gateway, Peer, WIDE, turns_of_others};
 use serde_json::{Value, json};
 
 const CLIENTS: usize = 16;
-/// The number of calls, goals, or registrations of a kind, of each client.
+/// The number of calls or goals of each client.
 const EACH: usize = 100;
 
 /// Each client sends `frame` [`EACH`] times. Then `end` ends all of them. Other tasks have turns meanwhile, and in the
@@ -39,24 +36,17 @@ fn assert_ends_in_turns(
         for _ in 0..CLIENTS * EACH {
             provider.receive().await;
         }
-        let turns = Rc::new(Cell::new(0));
-        let counted = Rc::clone(&turns);
-        let others = actix_rt::spawn(async move {
-            loop {
-                counted.set(counted.get() + 1);
-                tokio::task::yield_now().await;
+        let (turns, ends) = turns_of_others(async {
+            end(provider).await;
+            let mut ends = Vec::new();
+            for client in &mut clients {
+                for _ in 0..EACH {
+                    ends.push(client.receive().await);
+                }
             }
-        });
-        let before = turns.get();
-        end(provider).await;
-        let mut ends = Vec::new();
-        for client in &mut clients {
-            for _ in 0..EACH {
-                ends.push(client.receive().await);
-            }
-        }
-        others.abort();
-        let turns = turns.get() - before;
+            ends
+        })
+        .await;
         assert!(turns >= CLIENTS * EACH / 200, "{turns} turns");
         for ended in ends.chunks(EACH) {
             for (n, ended) in ended.iter().enumerate() {
@@ -93,34 +83,4 @@ fn goals_of_a_disconnected_action_server() {
     let goal = |n| json!({"op": "send_action_goal", "action": "/a", "action_type": "t/A", "id": n, "args": {}});
     let aborted = |result: &Value| result["op"] == "action_result" && result["status"] == 6;
     assert_ends_in_turns(goal, async |provider| drop(provider), aborted);
-}
-
-/// Registrations of every kind, with both spellings of a topic.
-#[test]
-fn registrations_of_disconnected_clients() {
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let mut clients: Vec<Peer> = (0..2).map(|_| gateway.connect(WIDE)).collect();
-        for client in &mut clients {
-            for frame in [
-                json!({"op": "subscribe", "topic": "/t"}),
-                json!({"op": "subscribe", "topic": "t"}),
-                json!({"op": "advertise", "topic": "/t", "type": "t/A"}),
-                json!({"op": "advertise", "topic": "/u", "type": "t/A"}),
-                json!({"op": "advertise_service", "service": "/s", "type": "t/S"}),
-                json!({"op": "advertise_action", "action": "/a", "type": "t/A"}),
-            ] {
-                client.send(frame).await;
-            }
-        }
-        settle().await;
-        for left in [4, 4, 0] {
-            let census = gateway.registry.send(TakeCensus).await.unwrap();
-            let registered = census.topics.len() + census.services.len() + census.actions.len();
-            assert_eq!(registered, left, "{census:?}");
-            // The last client has taken over the service and the action, so it disconnects last.
-            clients.drain(..clients.len().min(1));
-            settle().await;
-        }
-    });
 }

@@ -1,18 +1,18 @@
 //! Goals between their node and the arm: messages that cross. `exchanges/goals.txt` has the clients' frames.
 
-use crate::stage::{Published, SilentArm, Stage, asked, ms, pass};
+use crate::stage::{
+    Stage, accept, asked, ms, pass, pose_at, publisher, silent_arm, silent_tracker, stand_in,
+};
 use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{GoalTracker, IkAction, SendGoal};
-use pendularm::actors::arm::sim::{
-    ArmPose, CommandGoal, GoalOrder, GoalProgress, TrackGoal, Tracking,
-};
+use pendularm::actors::arm::sim::{CommandGoal, GoalOrder, GoalProgress, TrackGoal};
 use pendularm::actors::node::{Interest, Publish, ask};
 use pendularm::math::goal::{Criteria, Outcome};
 use pendularm::math::kinematics::Target;
 use pendularm::protocol::catalog::Topic;
-use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
+use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 
 /// A goal far from the starting pose.
 pub fn elsewhere() -> SendGoal<2> {
@@ -26,61 +26,24 @@ pub fn elsewhere() -> SendGoal<2> {
     }
 }
 
-/// Records the messages that it receives.
-struct Noting(UnboundedSender<&'static str>);
-
-impl Actor for Noting {
-    type Context = Context<Self>;
-}
-
-impl Handler<Publish> for Noting {
-    type Result = ();
-
-    fn handle(&mut self, _: Publish, _: &mut Context<Self>) {
-        self.0.send("published").unwrap();
-    }
-}
-
-impl Handler<CommandGoal<2>> for Noting {
-    type Result = ();
-
-    fn handle(&mut self, _: CommandGoal<2>, _: &mut Context<Self>) {
-        self.0.send("commanded").unwrap();
-    }
-}
-
-impl Handler<TrackGoal<2>> for Noting {
-    type Result = MessageResult<TrackGoal<2>>;
-
-    fn handle(
-        &mut self,
-        TrackGoal { goal, .. }: TrackGoal<2>,
-        _: &mut Context<Self>,
-    ) -> Self::Result {
-        self.0.send("announced").unwrap();
-        MessageResult(Tracking {
-            positions: goal.solution,
-            before: None,
-            obstacle: None,
-        })
-    }
-}
-
 /// Otherwise subscribers would see the old goal's trajectory as the new goal's.
 #[test]
 fn a_goal_is_announced_only_when_the_one_before_is_in_motion() {
     in_virtual_time(async {
         let (sender, mut noted) = unbounded_channel();
-        let noting = Noting(sender).start();
-        let silent = SilentArm.start();
+        let note = move |what: &'static str| sender.send(what).unwrap();
+        let (on_command, on_publish) = (note.clone(), note.clone());
         let tracker = GoalTracker {
-            track: noting.clone().recipient(),
-            command: noting.clone().recipient(),
-            end: silent.clone().recipient(),
-            add_barrier: silent.clone().recipient(),
+            track: stand_in(move |goal: TrackGoal<2>| {
+                note("announced");
+                accept(goal)
+            }),
+            command: stand_in(move |_: CommandGoal<2>| on_command("commanded")),
+            ..silent_tracker()
         };
-        let ik = Ik::<2>::new(silent.recipient()).start();
-        let action = IkAction::new(ik.recipient(), tracker, noting.recipient()).start();
+        let publish = stand_in(move |_: Publish| on_publish("published"));
+        let ik = Ik::<2>::new(silent_arm()).start();
+        let action = IkAction::new(ik.recipient(), tracker, publish).start();
         let goals = (0..3).map(|_| ask(&action.clone().recipient(), elsewhere()));
         for goal in goals.collect::<Vec<_>>() {
             goal.await.unwrap().unwrap();
@@ -98,12 +61,9 @@ fn a_goal_is_announced_only_when_the_one_before_is_in_motion() {
 #[test]
 fn nothing_is_encoded_for_a_topic_without_subscribers() {
     in_virtual_time(async {
-        let arm = SilentArm.start();
-        let ik = Ik::<2>::new(arm.clone().recipient()).start();
+        let ik = Ik::<2>::new(silent_arm()).start();
         let (sender, mut published) = unbounded_channel();
-        let publish = Published(sender).start().recipient();
-        let tracker = SilentArm::tracker(&arm);
-        let action = IkAction::new(ik.recipient(), tracker, publish).start();
+        let action = IkAction::new(ik.recipient(), silent_tracker(), publisher(sender)).start();
         for wanted in [false, true, false] {
             for topic in [Topic::IkFeedback, Topic::IkResult] {
                 action.send(Interest { topic, wanted }).await.unwrap();
@@ -115,7 +75,7 @@ fn nothing_is_encoded_for_a_topic_without_subscribers() {
                     number,
                     distance: 1.0,
                     elapsed: 1.0,
-                    pose: arm.send(ArmPose).await.unwrap(),
+                    pose: pose_at(0.0),
                     outcome,
                 };
                 action.send(judged).await.unwrap();
@@ -131,18 +91,13 @@ fn nothing_is_encoded_for_a_topic_without_subscribers() {
 }
 
 /// Receives the progress of a goal in place of its owner.
-struct Owner(UnboundedSender<GoalProgress<2>>);
-
-impl Actor for Owner {
-    type Context = Context<Self>;
-}
-
-impl Handler<GoalProgress<2>> for Owner {
-    type Result = ();
-
-    fn handle(&mut self, judged: GoalProgress<2>, _: &mut Context<Self>) {
-        self.0.send(judged).unwrap();
-    }
+fn owner() -> (
+    Recipient<GoalProgress<2>>,
+    UnboundedReceiver<GoalProgress<2>>,
+) {
+    let (sender, news) = unbounded_channel();
+    let owner = stand_in(move |judged| sender.send(judged).unwrap());
+    (owner, news)
 }
 
 /// Between the announcement of a goal and its setpoint another client's reset may come. Then the reset counts as the
@@ -151,8 +106,7 @@ impl Handler<GoalProgress<2>> for Owner {
 fn a_reset_that_overtakes_a_goals_setpoint_makes_it_void() {
     in_virtual_time(async {
         let (stage, _client) = Stage::<2>::with_a_floating_arm().await;
-        let (sender, mut news) = unbounded_channel();
-        let owner = Owner(sender).start();
+        let (owner, mut news) = owner();
         let announce = |number| {
             let goal = GoalOrder {
                 number,
@@ -160,7 +114,7 @@ fn a_reset_that_overtakes_a_goals_setpoint_makes_it_void() {
                 criteria: Criteria::default(),
                 solution: [0.0, 1.5],
             };
-            let owner = owner.clone().recipient();
+            let owner = owner.clone();
             stage.arm.send(TrackGoal { goal, owner })
         };
         let command = |number| CommandGoal {
@@ -186,8 +140,7 @@ fn a_reset_that_overtakes_a_goals_setpoint_makes_it_void() {
 fn a_goal_is_not_judged_before_its_setpoint_has_come() {
     in_virtual_time(async {
         let (stage, _client) = Stage::<2>::with_a_floating_arm().await;
-        let (sender, mut news) = unbounded_channel();
-        let owner = Owner(sender).start();
+        let (owner, mut news) = owner();
         let goal = GoalOrder {
             number: 1,
             target: glam::dvec2(2.0, 0.0),
@@ -197,7 +150,6 @@ fn a_goal_is_not_judged_before_its_setpoint_has_come() {
             },
             solution: [0.0, 0.0],
         };
-        let owner = owner.clone().recipient();
         let tracking = stage.arm.send(TrackGoal { goal, owner }).await.unwrap();
         assert_eq!(tracking.positions, [0.0, 0.0]);
         pass(ms(100)).await;

@@ -6,7 +6,9 @@ use std::rc::Rc;
 use std::sync::atomic::Ordering;
 
 use crate::ik_action::elsewhere;
-use crate::stage::{Client, Published, SilentArm, asked, connect, ms, pass};
+use crate::stage::{
+    Client, asked, connect, ms, pass, pose_at, publisher, silent_arm, silent_tracker, stand_in,
+};
 use crate::system::{counting_wake_ups, in_virtual_time};
 use actix::prelude::*;
 use pendularm::actors::arm::ik::{Ik, SolveError};
@@ -17,7 +19,7 @@ use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, TrialRequest};
 use pendularm::actors::arm::sim::{ArmPose, Pose};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::node::Barrier;
-use pendularm::actors::node::{Call, Interest, Publish};
+use pendularm::actors::node::{Call, Interest};
 use pendularm::actors::nodes::start_goal_nodes;
 use pendularm::math::goal::Outcome;
 use pendularm::math::kinematics::{Target, Unreachable};
@@ -65,72 +67,20 @@ struct Script {
     owner: Option<Recipient<GoalReport<2>>>,
 }
 
-struct StandIn {
-    script: Rc<RefCell<Script>>,
-    born: Instant,
-}
-
-impl StandIn {
-    fn pose(&self) -> Pose<2> {
-        Pose {
-            lengths: self.script.borrow().lengths,
-            positions: [0.0, 0.0],
-            time: self.born.elapsed().as_secs_f64(),
-            resets: 0,
-            simulated: self.born.elapsed().as_secs_f64(),
-            obstacle: None,
-        }
-    }
-}
-
-impl Actor for StandIn {
-    type Context = Context<Self>;
-}
-
-impl Handler<ArmPose<2>> for StandIn {
-    type Result = MessageResult<ArmPose<2>>;
-
-    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Self::Result {
-        MessageResult(self.pose())
-    }
-}
-
-impl Handler<Call<SendGoal<2>>> for StandIn {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<SendGoal<2>>, _: &mut Context<Self>) {
-        let mut script = self.script.borrow_mut();
-        script.sent.push(call.ask.target);
-        if script.refusals > 0 {
-            script.refusals -= 1;
+impl Script {
+    /// The answer of `ik_action` to a goal.
+    fn accept(&mut self, goal: SendGoal<2>) -> Result<String, GoalRejected> {
+        self.sent.push(goal.target);
+        if self.refusals > 0 {
+            self.refusals -= 1;
             let why = SolveError::Unreachable(Unreachable::NotFinite("x"));
-            return call.reply.conclude(Err(GoalRejected::Unsolved(why)));
+            return Err(GoalRejected::Unsolved(why));
         }
-        script.owner = match call.ask.owner {
+        self.owner = match goal.owner {
             Some(GoalOwner::Node(owner)) => Some(owner),
             _ => None,
         };
-        let id = format!("goal-{}", script.sent.len());
-        call.reply.conclude(Ok(id));
-    }
-}
-
-impl Handler<Call<CancelGoal>> for StandIn {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<CancelGoal>, _: &mut Context<Self>) {
-        call.reply.conclude(Err(CancelRejected::NotActive));
-    }
-}
-
-impl Handler<Barrier> for StandIn {
-    type Result = ();
-
-    fn handle(&mut self, _: Barrier, _: &mut Context<Self>) {
-        let mut script = self.script.borrow_mut();
-        for news in std::mem::take(&mut script.news) {
-            script.owner.as_ref().unwrap().do_send(news);
-        }
+        Ok(format!("goal-{}", self.sent.len()))
     }
 }
 
@@ -140,14 +90,7 @@ fn reached_at(time: f64) -> GoalReport<2> {
         goal_id: "goal-1".to_owned(),
         distance: 0.0,
         positions: [0.0, 0.0],
-        pose: Pose {
-            lengths: [1.0, 1.0],
-            positions: [0.0, 0.0],
-            time,
-            resets: 0,
-            simulated: time,
-            obstacle: None,
-        },
+        pose: pose_at(time),
         outcome: Some(Outcome::Reached),
     }
 }
@@ -157,19 +100,29 @@ async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Addr<IkTrial<2>>, C
     let gauges = std::sync::Arc::default();
     let registry = Registry::new(std::sync::Arc::clone(&gauges)).start();
     let born = Instant::now();
-    let stand_in = StandIn {
-        script: Rc::clone(script),
-        born,
-    }
-    .start();
+    let (of_arm, of_goals, of_barrier) = (Rc::clone(script), Rc::clone(script), Rc::clone(script));
+    let arm = stand_in(move |_: ArmPose<2>| Pose {
+        lengths: of_arm.borrow().lengths,
+        ..pose_at(born.elapsed().as_secs_f64())
+    });
     let goals = GoalClient {
-        send: stand_in.clone().recipient(),
-        cancel: stand_in.clone().recipient(),
-        barrier: stand_in.clone().recipient(),
+        send: stand_in(move |call: Call<SendGoal<2>>| {
+            let answer = of_goals.borrow_mut().accept(call.ask);
+            call.reply.conclude(answer);
+        }),
+        cancel: stand_in(|call: Call<CancelGoal>| {
+            call.reply.conclude(Err(CancelRejected::NotActive));
+        }),
+        barrier: stand_in(move |_: Barrier| {
+            let mut script = of_barrier.borrow_mut();
+            for news in std::mem::take(&mut script.news) {
+                script.owner.as_ref().unwrap().do_send(news);
+            }
+        }),
     };
     let publish = registry.clone().recipient();
     let rng = fastrand::Rng::with_seed(1);
-    let trial = IkTrial::<2>::new(stand_in.recipient(), goals, publish, rng).start();
+    let trial = IkTrial::<2>::new(arm, goals, publish, rng).start();
     let mut nodes = Nodes::default();
     IkTrial::attach(&trial, &mut nodes);
     registry.send(Attach(nodes)).await.unwrap();
@@ -229,19 +182,17 @@ fn after_a_refusal_another_target_is_sampled_for_the_lengths_of_that_moment() {
 #[test]
 fn no_status_is_encoded_without_a_subscriber() {
     in_virtual_time(async {
-        let arm = SilentArm.start();
         let (sender, mut published) = unbounded_channel();
-        let publish: Recipient<Publish> = Published(sender).start().recipient();
-        let ik = Ik::<2>::new(arm.clone().recipient()).start();
-        let action =
-            IkAction::new(ik.recipient(), SilentArm::tracker(&arm), publish.clone()).start();
+        let publish = publisher(sender);
+        let ik = Ik::<2>::new(silent_arm()).start();
+        let action = IkAction::new(ik.recipient(), silent_tracker(), publish.clone()).start();
         let goals = GoalClient {
             send: action.clone().recipient(),
             cancel: action.clone().recipient(),
             barrier: action.recipient(),
         };
         let rng = fastrand::Rng::with_seed(1);
-        let trial = IkTrial::new(arm.recipient(), goals, publish, rng).start();
+        let trial = IkTrial::new(silent_arm(), goals, publish, rng).start();
         for (wanted, expected) in [(false, 0), (true, 2), (false, 0)] {
             let topic = Topic::TrialStatus;
             trial.send(Interest { topic, wanted }).await.unwrap();
@@ -264,10 +215,8 @@ fn no_timer_runs_without_a_goal_a_trial_or_a_subscriber() {
         let gauges = std::sync::Arc::default();
         let registry = Registry::new(std::sync::Arc::clone(&gauges)).start();
         let mut nodes = Nodes::default();
-        let arm = SilentArm.start();
-        let tracker = SilentArm::tracker(&arm);
-        let (action, trial) =
-            start_goal_nodes::<2>(arm.recipient(), tracker, &registry, 1, &mut nodes);
+        let (arm, tracker) = (silent_arm(), silent_tracker());
+        let (action, trial) = start_goal_nodes::<2>(arm, tracker, &registry, 1, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
         let mut client = connect(&registry, &gauges);
         client.ask("/ik/solve", json!({"x": 1, "y": 1})).await;

@@ -37,20 +37,6 @@ fn heavy() -> IntegrationStep {
 }
 
 #[test]
-fn a_call_of_a_disconnected_caller_ends_early_and_once() {
-    in_real_time(async {
-        let mut bench = study::<2>();
-        let call = bench.ask_as(1, heavy());
-        call.gone.store(true, Ordering::Relaxed);
-        // The registry drops the answer. Every call ends with one.
-        assert_eq!(bench.next().await, 1);
-        assert!(matches!(call.answer.await, Ok(Err(Unserved::CallerGone))));
-        assert!(timeout(PATIENCE, call.ended).await.is_ok());
-        assert_nothing_more(&mut bench).await;
-    });
-}
-
-#[test]
 fn a_caller_that_disconnects_at_any_moment_gets_one_answer() {
     in_real_time(async {
         let mut bench = study::<2>();

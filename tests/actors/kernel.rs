@@ -277,27 +277,21 @@ fn a_goal_and_its_messages_are_the_same() {
         ] {
             both.subscribe(topic).await;
         }
-        both.agree("/ik_action/send_goal", json!({"x": 0.7, "y": 0.9}))
-            .await;
-        both.agree("/pid_controller/enable", json!({"data": true}))
-            .await;
-        both.pass(ms(900)).await;
-        // Another goal takes its place, and a third is cancelled.
-        both.agree("/ik_action/send_goal", json!({"x": -0.7, "y": 1.1}))
-            .await;
-        both.pass(ms(6000)).await;
-        both.agree("/ik_action/send_goal", json!({"x": 0.2, "y": -1.1}))
-            .await;
-        both.pass(ms(50)).await;
-        both.agree("/ik_action/cancel_goal", json!({"goal_id": "goal-3"}))
-            .await;
-        both.agree("/ik_action/send_goal", json!({"x": 0.3, "y": -1.1}))
-            .await;
-        both.pass(ms(50)).await;
-        both.agree("/arm_sim/reset", json!({})).await;
-        both.agree("/arm_sim/pause", json!({"data": true})).await;
-        both.agree("/arm_sim/step", json!({"steps": 1500})).await;
-        both.pass(ms(100)).await;
+        // Another goal takes the first one's place, the third is cancelled, and a reset ends the fourth.
+        for (service, args, time) in [
+            ("/ik_action/send_goal", json!({"x": 0.7, "y": 0.9}), 0),
+            ("/pid_controller/enable", json!({"data": true}), 900),
+            ("/ik_action/send_goal", json!({"x": -0.7, "y": 1.1}), 6000),
+            ("/ik_action/send_goal", json!({"x": 0.2, "y": -1.1}), 50),
+            ("/ik_action/cancel_goal", json!({"goal_id": "goal-3"}), 0),
+            ("/ik_action/send_goal", json!({"x": 0.3, "y": -1.1}), 50),
+            ("/arm_sim/reset", json!({}), 0),
+            ("/arm_sim/pause", json!({"data": true}), 0),
+            ("/arm_sim/step", json!({"steps": 1500}), 100),
+        ] {
+            both.agree(service, args).await;
+            both.pass(ms(time)).await;
+        }
         both.client.settle().await;
         assert_eq!(both.agree_on("/ik_action/result"), 4);
         assert_eq!(both.agree_on("/joint_trajectory"), 4);
@@ -312,14 +306,16 @@ fn a_trial_has_the_same_targets_and_the_same_end() {
         let mut both = Both::<2>::start().await;
         both.subscribe("/ik_action/result").await;
         both.subscribe("/joint_trajectory").await;
-        both.agree("/pid_controller/enable", json!({"data": true}))
-            .await;
         let terms = json!({"duration": 20.0, "epsilon": 0.05, "success_hold": 0.2});
-        both.agree("/ik_trial/start", terms).await;
-        both.pass(ms(9000)).await;
-        both.agree("/ik_trial/skip", json!({})).await;
-        both.pass(ms(12_000)).await;
-        both.agree("/ik_trial/stop", json!({})).await;
+        for (service, args, time) in [
+            ("/pid_controller/enable", json!({"data": true}), 0),
+            ("/ik_trial/start", terms, 9000),
+            ("/ik_trial/skip", json!({}), 12_000),
+            ("/ik_trial/stop", json!({}), 0),
+        ] {
+            both.agree(service, args).await;
+            both.pass(ms(time)).await;
+        }
         both.client.settle().await;
         assert!(both.agree_on("/ik_action/result") > 3);
         assert!(both.agree_on("/joint_trajectory") > 3);
@@ -331,15 +327,10 @@ fn setpoints_and_efforts_are_taken_or_refused_alike() {
     in_virtual_time(async {
         let mut both = Both::<2>::start().await;
         both.subscribe("/joint_trajectory").await;
+        let point = |positions: &[f64]| json!({"points": [{"positions": positions}]});
         for (topic, msg) in [
-            (
-                "/joint_trajectory",
-                json!({"points": [{"positions": [0.4, -0.2]}]}),
-            ),
-            (
-                "/joint_trajectory",
-                json!({"points": [{"positions": [0.4]}]}),
-            ),
+            ("/joint_trajectory", point(&[0.4, -0.2])),
+            ("/joint_trajectory", point(&[0.4])),
             ("/joint_trajectory", json!({"points": []})),
             ("/effort_controller/commands", json!({"data": [1.5, -0.5]})),
             ("/effort_controller/commands", json!({"data": [1.5]})),

@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** an accepted client stays connected when the listening ends; a later one is not accepted.
 
+use std::net::SocketAddr;
 use std::sync::Arc;
 
 use crate::system::in_real_time;
@@ -13,6 +14,14 @@ use pendularm::actors::gateway::registry::Registry;
 use pendularm::actors::resources::gauges::Gauges;
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
+
+fn listen() -> (Addr<Listener>, SocketAddr) {
+    let socket = bind("127.0.0.1:0".parse().unwrap()).unwrap();
+    let address = socket.local_addr().unwrap();
+    let gauges = Arc::new(Gauges::default());
+    let registry = Registry::new(Arc::clone(&gauges)).start();
+    (Listener::new(socket, registry, gauges).start(), address)
+}
 
 async fn exchange(stream: &mut BufReader<TcpStream>) {
     stream
@@ -28,11 +37,7 @@ async fn exchange(stream: &mut BufReader<TcpStream>) {
 #[test]
 fn accepted_clients_outlive_the_listening() {
     in_real_time(async {
-        let socket = bind("127.0.0.1:0".parse().unwrap()).unwrap();
-        let address = socket.local_addr().unwrap();
-        let gauges = Arc::new(Gauges::default());
-        let registry = Registry::new(Arc::clone(&gauges)).start();
-        let listener = Listener::new(socket, registry, gauges).start();
+        let (listener, address) = listen();
         let mut clients = Vec::new();
         for _ in 0..20 {
             let mut client = BufReader::new(TcpStream::connect(address).await.unwrap());
@@ -58,11 +63,7 @@ fn accepted_clients_outlive_the_listening() {
 #[test]
 fn a_silent_client_gets_a_ping_after_a_while() {
     in_real_time(async {
-        let socket = bind("127.0.0.1:0".parse().unwrap()).unwrap();
-        let address = socket.local_addr().unwrap();
-        let gauges = Arc::new(Gauges::default());
-        let registry = Registry::new(Arc::clone(&gauges)).start();
-        Listener::new(socket, registry, gauges).start();
+        let (_listener, address) = listen();
         let mut client = BufReader::new(TcpStream::connect(address).await.unwrap());
         exchange(&mut client).await;
         let (ours, theirs) = (

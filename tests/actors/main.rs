@@ -11,7 +11,6 @@ mod arm_turns;
 mod askers;
 mod by_hand;
 mod connection;
-mod encodings;
 mod endings;
 mod exchanges;
 #[cfg(feature = "web")]

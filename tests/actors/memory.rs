@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use crate::study::SettledArm;
+use crate::study::settled_arm;
 use crate::system::in_real_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
 use actix::prelude::*;
@@ -28,8 +28,8 @@ fn places_and_pools_have_the_documented_sizes() {
 /// A gateway with real computations, on real threads: so this test is in real time.
 async fn computing(answers: usize, workers: &WorkerPool) -> Gateway {
     let mut nodes = Nodes::default();
-    let arm = SettledArm::<2>.start().recipient();
-    Study::attach(&Study::new(arm, workers.clone()).start(), &mut nodes);
+    let study = Study::new(settled_arm::<2>(), workers.clone());
+    Study::attach(&study.start(), &mut nodes);
     Gateway::within(Memory::of(1, answers), nodes).await
 }
 

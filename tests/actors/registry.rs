@@ -11,7 +11,7 @@ use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Node, WIDE, settle};
 use pendularm::actors::gateway::messages::Publish;
 use pendularm::actors::gateway::registry::Nodes;
-use pendularm::protocol::catalog::{Service, Topic};
+use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages;
 use serde_json::json;
 
@@ -111,25 +111,5 @@ fn a_trajectory_has_taken_effect_before_its_senders_next_frame_is_taken() {
         assert_eq!(held.borrow().len(), 1);
         held.borrow_mut().clear();
         assert_eq!(client.receive().await["id"], 1);
-    });
-}
-
-#[test]
-fn a_service_without_a_node_is_refused() {
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let mut client = gateway.connect(WIDE);
-        for service in Service::ALL {
-            client.call(service.name(), 1).await;
-            let response = client.receive().await;
-            assert_eq!(response["result"], false, "{response}");
-            assert!(
-                response["status"]
-                    .as_str()
-                    .unwrap()
-                    .contains(service.name()),
-                "{response}"
-            );
-        }
     });
 }

@@ -3,13 +3,11 @@
 //! **Invariant:** the panic hook belongs to the process, so these tests share one that records panics and ends
 //! nothing.
 
-use std::pin::Pin;
 use std::sync::{Arc, Mutex, OnceLock};
-use std::task::{self, Poll};
 use std::time::Duration;
 
 use crate::system::{in_real_time, in_virtual_time};
-use crate::virtual_time::{Gateway, Node, WIDE, settle};
+use crate::virtual_time::{Gateway, Node, WIDE, Watched, settle};
 use bytes::Bytes;
 use pendularm::actors::compute::workers::{Computation, Progress, WorkerPool};
 use pendularm::actors::gateway::connection::Connection;
@@ -19,7 +17,7 @@ use pendularm::actors::panics::{self, contain, contained};
 use pendularm::actors::wire::Caller;
 use pendularm::protocol::catalog::{Service, Topic};
 use serde_json::json;
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream, ReadBuf};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::time::timeout;
 
 static ENDS: OnceLock<Mutex<Vec<String>>> = OnceLock::new();
@@ -39,49 +37,6 @@ fn has_ended_by(words: &str) -> bool {
     ends().iter().any(|what| what.contains(words))
 }
 
-/// A stream that panics at its first read or write.
-struct Trap {
-    stream: DuplexStream,
-    in_reading: bool,
-}
-
-impl AsyncRead for Trap {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        cx: &mut task::Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<std::io::Result<()>> {
-        let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
-        assert!(
-            !(self.in_reading && buffer.filled().ends_with(b"trap\n")),
-            "in reading"
-        );
-        polled
-    }
-}
-
-impl AsyncWrite for Trap {
-    fn poll_write(
-        mut self: Pin<&mut Self>,
-        cx: &mut task::Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<std::io::Result<usize>> {
-        assert!(self.in_reading, "in writing");
-        Pin::new(&mut self.stream).poll_write(cx, bytes)
-    }
-
-    fn poll_flush(self: Pin<&mut Self>, _: &mut task::Context<'_>) -> Poll<std::io::Result<()>> {
-        Poll::Ready(Ok(()))
-    }
-
-    fn poll_shutdown(
-        mut self: Pin<&mut Self>,
-        cx: &mut task::Context<'_>,
-    ) -> Poll<std::io::Result<()>> {
-        Pin::new(&mut self.stream).poll_shutdown(cx)
-    }
-}
-
 /// The client is disconnected, its registrations are withdrawn, and the others are served.
 #[test]
 fn a_panic_in_a_reader_or_writer_ends_that_client_alone() {
@@ -91,7 +46,12 @@ fn a_panic_in_a_reader_or_writer_ends_that_client_alone() {
             let gateway = Gateway::bare().await;
             let mut other = gateway.connect(WIDE);
             let (mut ours, stream) = tokio::io::duplex(WIDE);
-            let trap = Trap { stream, in_reading };
+            let mut trap = Watched::new(stream);
+            if in_reading {
+                trap.on_read = Box::new(|bytes| assert!(!bytes.ends_with(b"trap\n"), "in reading"));
+            } else {
+                trap.on_write = Box::new(|_| panic!("in writing"));
+            }
             Connection::start_on(trap, gateway.registry.clone(), Arc::clone(&gateway.gauges));
             let frames = json!({"op": "advertise_service", "service": "/s"});
             ours.write_all(format!("{frames}\n").as_bytes())

@@ -27,7 +27,7 @@ fn line(frame: &Bytes) -> &str {
 }
 
 #[test]
-fn a_joint_state_has_the_shape_that_ros_gives_it() {
+fn messages_have_the_shapes_that_ros_gives_them() {
     let state = JointState {
         header: Header::world(1.25),
         name: &["joint1", "joint2"],
@@ -35,45 +35,43 @@ fn a_joint_state_has_the_shape_that_ros_gives_it() {
         velocity: &[0.0, 1e-9],
         effort: &[12.0, 1e21],
     };
-    assert_eq!(
-        line(&publish("/joint_states", &state)),
-        concat!(
-            r#"{"op":"publish","topic":"/joint_states","msg":"#,
-            r#"{"header":{"stamp":{"sec":1,"nanosec":250000000},"frame_id":"world"},"#,
-            r#""name":["joint1","joint2"],"position":[0.5,-1.0],"velocity":[0.0,1e-9],"effort":[12.0,1e+21]}}"#
-        )
-    );
-}
-
-#[test]
-fn clock_and_diagnostics_have_the_shapes_that_ros_gives_them() {
     let clock = Clock {
         clock: Stamp::from_seconds(2.0),
     };
-    assert_eq!(
-        serde_json::to_string(&clock).unwrap(),
-        r#"{"clock":{"sec":2,"nanosec":0}}"#
-    );
-    let diagnostics = DiagnosticArray {
-        header: Header::world(0.0),
-        status: vec![DiagnosticStatus {
-            level: 1,
-            name: "arm_sim",
-            message: "paused".to_owned(),
-            hardware_id: "",
-            values: vec![KeyValue {
-                key: "energy",
-                value: "1.5".to_owned(),
-            }],
+    let status = DiagnosticStatus {
+        level: 1,
+        name: "arm_sim",
+        message: "paused".to_owned(),
+        hardware_id: "",
+        values: vec![KeyValue {
+            key: "energy",
+            value: "1.5".to_owned(),
         }],
     };
-    assert_eq!(
-        serde_json::to_string(&diagnostics).unwrap(),
-        concat!(
-            r#"{"header":{"stamp":{"sec":0,"nanosec":0},"frame_id":"world"},"status":["#,
-            r#"{"level":1,"name":"arm_sim","message":"paused","hardware_id":"","values":[{"key":"energy","value":"1.5"}]}]}"#
-        )
-    );
+    let diagnostics = DiagnosticArray {
+        header: Header::world(0.0),
+        status: vec![status],
+    };
+    for (frame, msg) in [
+        (
+            publish("/x", &state),
+            concat!(
+                r#"{"header":{"stamp":{"sec":1,"nanosec":250000000},"frame_id":"world"},"name":["joint1","joint2"],"#,
+                r#""position":[0.5,-1.0],"velocity":[0.0,1e-9],"effort":[12.0,1e+21]}"#
+            ),
+        ),
+        (publish("/x", &clock), r#"{"clock":{"sec":2,"nanosec":0}}"#),
+        (
+            publish("/x", &diagnostics),
+            concat!(
+                r#"{"header":{"stamp":{"sec":0,"nanosec":0},"frame_id":"world"},"status":[{"level":1,"#,
+                r#""name":"arm_sim","message":"paused","hardware_id":"","values":[{"key":"energy","value":"1.5"}]}]}"#
+            ),
+        ),
+    ] {
+        let whole = format!(r#"{{"op":"publish","topic":"/x","msg":{msg}}}"#);
+        assert_eq!(line(&frame), whole);
+    }
 }
 
 #[test]

@@ -11,13 +11,6 @@ pub fn stamp(message: &Value) -> f64 {
     time(&message["header"]["stamp"])
 }
 
-/// Waits until the arm has made this many ticks. The client subscribes to `/joint_states`.
-pub fn ticks(client: &mut Client, count: usize) {
-    for _ in 0..count {
-        client.message("/joint_states");
-    }
-}
-
 /// A `builtin_interfaces/msg/Time` in s.
 pub fn time(stamp: &Value) -> f64 {
     let sec = stamp["sec"].as_f64().expect("sec");

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use pendularm_client::ending;
 
 pub use pendularm_client::blocking::{Client, PATIENCE};
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// The variables of the environment that the program reads.
 pub const VARIABLES: [&str; 13] = [
@@ -58,13 +58,6 @@ pub fn provide(client: &mut Client, service: &str) {
     assert_eq!(status["id"], "ad");
 }
 
-/// The next call that reaches a provider.
-pub fn forwarded(provider: &mut Client) -> Value {
-    let frame = provider.receive_where("forwarded call", |frame| frame["op"] == "call_service");
-    assert!(frame["id"].is_string(), "{frame}");
-    frame
-}
-
 /// The message to a client beyond the limit, before its end.
 #[track_caller]
 pub fn refusal_of(client: &mut Client) -> String {
@@ -85,14 +78,6 @@ pub fn is_served_at_last(address: SocketAddr) -> bool {
         }
     }
     false
-}
-
-/// Answers a call that has reached a provider, or pretends to.
-pub fn respond(provider: &mut Client, call: &Value, values: Value) {
-    provider.send(
-        &json!({"op": "service_response", "service": call["service"], "id": call["id"],
-        "values": values, "result": true}),
-    );
 }
 
 /// The exit status of a process that must end by itself, and the elapsed time.
@@ -200,6 +185,13 @@ impl Runtime {
 
     pub fn pid(&self) -> u32 {
         self.child.id()
+    }
+
+    /// Ends the program in order.
+    #[track_caller]
+    pub fn stop(mut self) {
+        signal(self.pid(), "TERM");
+        assert!(self.end().0.success());
     }
 
     /// As [`end`], for the program.

@@ -12,8 +12,8 @@ use crate::nodes::start_whole;
 use actix::prelude::*;
 use pendularm::actors::arm::ik_action::GoalTracker;
 use pendularm::actors::arm::sim::{
-    AddBarrier, ArmPose, ArmSim, CommandGoal, EndGoal, GoalProgress, Pose, Reset, SetParams,
-    SetSetpoint, Snapshot, TakeSnapshot, TrackGoal, Tracking,
+    ArmPose, ArmSim, Pose, Reset, SetParams, SetSetpoint, Snapshot, TakeSnapshot, TrackGoal,
+    Tracking,
 };
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::connection::Connection;
@@ -210,87 +210,66 @@ pub async fn pass(time: Duration) {
     sleep(time).await;
 }
 
-/// An arm that sends only answers, and takes no steps.
-pub struct SilentArm;
+/// A substitute for a node: it answers each message by a closure.
+struct StandIn<M: Message>(Box<dyn FnMut(M) -> M::Result>);
 
-impl SilentArm {
-    /// A substitute for the arm, for `ik_action`.
-    pub fn tracker(address: &Addr<Self>) -> GoalTracker<2> {
-        GoalTracker {
-            track: address.clone().recipient(),
-            command: address.clone().recipient(),
-            end: address.clone().recipient(),
-            add_barrier: address.clone().recipient(),
-        }
-    }
-}
-
-impl Actor for SilentArm {
+impl<M: Message + 'static> Actor for StandIn<M> {
     type Context = Context<Self>;
 }
 
-impl Handler<AddBarrier> for SilentArm {
-    type Result = ();
+impl<M: Message<Result: 'static> + 'static> Handler<M> for StandIn<M> {
+    type Result = MessageResult<M>;
 
-    fn handle(&mut self, _: AddBarrier, _: &mut Context<Self>) {}
-}
-
-impl Handler<ArmPose<2>> for SilentArm {
-    type Result = MessageResult<ArmPose<2>>;
-
-    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Self::Result {
-        MessageResult(Pose {
-            lengths: [1.0, 1.0],
-            positions: [0.0, 0.0],
-            time: 0.0,
-            resets: 0,
-            simulated: 0.0,
-            obstacle: None,
-        })
+    fn handle(&mut self, message: M, _: &mut Context<Self>) -> Self::Result {
+        MessageResult((self.0)(message))
     }
 }
 
-impl Handler<TrackGoal<2>> for SilentArm {
-    type Result = MessageResult<TrackGoal<2>>;
+/// A node that answers messages of one type by this closure.
+pub fn stand_in<M>(answer: impl FnMut(M) -> M::Result + 'static) -> Recipient<M>
+where
+    M: Message<Result: Send + 'static> + Send + 'static,
+{
+    StandIn(Box::new(answer)).start().recipient()
+}
 
-    fn handle(
-        &mut self,
-        TrackGoal { goal, .. }: TrackGoal<2>,
-        _: &mut Context<Self>,
-    ) -> Self::Result {
-        MessageResult(Tracking {
-            positions: goal.solution,
-            before: None,
-            obstacle: None,
-        })
+/// A pose at q = 0, with links of 1 m.
+pub fn pose_at(time: f64) -> Pose<2> {
+    Pose {
+        lengths: [1.0, 1.0],
+        positions: [0.0, 0.0],
+        time,
+        resets: 0,
+        simulated: time,
+        obstacle: None,
     }
 }
 
-impl Handler<CommandGoal<2>> for SilentArm {
-    type Result = ();
-
-    fn handle(&mut self, _: CommandGoal<2>, _: &mut Context<Self>) {}
+/// The pose of an arm that takes no steps.
+pub fn silent_arm() -> Recipient<ArmPose<2>> {
+    stand_in(|_| pose_at(0.0))
 }
 
-impl Handler<EndGoal<2>> for SilentArm {
-    type Result = Option<GoalProgress<2>>;
+/// The same arm for `ik_action`: it accepts every goal and reports nothing about it.
+pub fn silent_tracker() -> GoalTracker<2> {
+    GoalTracker {
+        track: stand_in(accept),
+        command: stand_in(|_| ()),
+        end: stand_in(|_| None),
+        add_barrier: stand_in(|_| ()),
+    }
+}
 
-    fn handle(&mut self, _: EndGoal<2>, _: &mut Context<Self>) -> Self::Result {
-        None
+/// The answer of an arm that has accepted a goal.
+pub fn accept(TrackGoal { goal, .. }: TrackGoal<2>) -> Tracking<2> {
+    Tracking {
+        positions: goal.solution,
+        before: None,
+        obstacle: None,
     }
 }
 
 /// Receives what nodes publish in place of the registry: messages without subscribers are kept, too.
-pub struct Published(pub UnboundedSender<Topic>);
-
-impl Actor for Published {
-    type Context = Context<Self>;
-}
-
-impl Handler<Publish> for Published {
-    type Result = ();
-
-    fn handle(&mut self, message: Publish, _: &mut Context<Self>) {
-        self.0.send(message.topic).unwrap();
-    }
+pub fn publisher(published: UnboundedSender<Topic>) -> Recipient<Publish> {
+    stand_in(move |message: Publish| published.send(message.topic).unwrap())
 }

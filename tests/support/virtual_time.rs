@@ -3,14 +3,19 @@
 //!
 //! The clock moves only when everything waits for it, so a time that a test reads is exact to the timers' millisecond.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
+use std::io::{self, IoSlice};
+use std::net::SocketAddr;
 use std::ops::{Deref, DerefMut};
+use std::pin::Pin;
 use std::rc::Rc;
 use std::sync::Arc;
+use std::task::{self, Poll};
 use std::time::Duration;
 
 use actix::prelude::*;
 use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::Interest;
 use pendularm::actors::resources::gauges::Gauges;
@@ -19,7 +24,7 @@ use pendularm::actors::wire::{Caller, Nodes, ServiceCall, TopicMessage};
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm_client::pipe::Client;
 use serde_json::{Value, json};
-use tokio::io::{AsyncReadExt, DuplexStream, duplex};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, DuplexStream, ReadBuf, duplex};
 use tokio::time::{Instant, sleep};
 
 /// Longer than any wait of a test.
@@ -51,6 +56,15 @@ impl Gateway {
         let registry = Registry::new(Arc::clone(&gauges)).start();
         registry.send(Attach(nodes)).await.expect("a registry");
         Self { registry, gauges }
+    }
+
+    /// The client's end of a new connection under these conditions. Its pipe holds `room` bytes each way.
+    pub fn open(&self, admission: Arc<Admission>, room: usize) -> DuplexStream {
+        let (ours, theirs) = duplex(room);
+        let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
+        let local = SocketAddr::from(([127, 0, 0, 1], 9095));
+        Connection::start_with(admission, local, theirs, registry, gauges);
+        ours
     }
 
     /// A client whose pipe holds `room` bytes each way.
@@ -122,6 +136,81 @@ impl Peer {
 /// Runs all work that needs no virtual time, or almost none.
 pub async fn settle() {
     sleep(Duration::from_millis(10)).await;
+}
+
+/// The number of turns of other tasks during `doing`, and its result.
+pub async fn turns_of_others<T>(doing: impl Future<Output = T>) -> (usize, T) {
+    let turns = Rc::new(Cell::new(0));
+    let counted = Rc::clone(&turns);
+    let others = actix_rt::spawn(async move {
+        loop {
+            counted.set(counted.get() + 1);
+            tokio::task::yield_now().await;
+        }
+    });
+    let done = doing.await;
+    others.abort();
+    (turns.get(), done)
+}
+
+type OnBytes = Box<dyn FnMut(&[u8])>;
+
+/// A pipe that shows bytes to closures: after they are read, and before they are written.
+pub struct Watched {
+    stream: DuplexStream,
+    pub on_read: OnBytes,
+    pub on_write: OnBytes,
+}
+
+impl Watched {
+    pub fn new(stream: DuplexStream) -> Self {
+        Self {
+            stream,
+            on_read: Box::new(|_| ()),
+            on_write: Box::new(|_| ()),
+        }
+    }
+}
+
+impl AsyncRead for Watched {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut task::Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let before = buffer.filled().len();
+        let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
+        (self.on_read)(&buffer.filled()[before..]);
+        polled
+    }
+}
+
+impl AsyncWrite for Watched {
+    fn poll_write(
+        self: Pin<&mut Self>,
+        cx: &mut task::Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        self.poll_write_vectored(cx, &[IoSlice::new(bytes)])
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        cx: &mut task::Context<'_>,
+        slices: &[IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        let bytes: Vec<u8> = slices.iter().flat_map(|slice| slice.to_vec()).collect();
+        (self.on_write)(&bytes);
+        Pin::new(&mut self.stream).poll_write(cx, &bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut task::Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut task::Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
 }
 
 /// A node that keeps received calls unanswered.

@@ -86,22 +86,3 @@ pub fn handshake(address: SocketAddr) -> String {
          Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
     )
 }
-
-/// The status of a handshake, and its body if it was refused.
-pub fn try_handshake(address: SocketAddr, path: &str, headers: &str) -> (u16, String) {
-    let mut stream = TcpStream::connect(address).expect("the program accepts");
-    stream.set_read_timeout(Some(PATIENCE)).unwrap();
-    let request = format!("GET {path} HTTP/1.1\r\n{headers}\r\n");
-    stream.write_all(request.as_bytes()).unwrap();
-    let mut bytes = Vec::new();
-    let mut chunk = [0; 4096];
-    while !bytes.starts_with(b"HTTP/1.1 101 ") || !bytes.ends_with(b"\r\n\r\n") {
-        match stream.read(&mut chunk) {
-            Ok(0) => break,
-            Ok(read) => bytes.extend_from_slice(&chunk[..read]),
-            Err(error) => panic!("{error}"),
-        }
-    }
-    let answer = Answer::parse(&bytes);
-    (answer.status, answer.text().to_owned())
-}

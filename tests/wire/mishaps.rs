@@ -64,14 +64,13 @@ fn a_signal_that_was_ignored_at_the_start_stays_ignored_but_for_requests_to_end(
 
 #[test]
 fn signals_of_failed_writes_and_harmless_signals_affect_no_client() {
-    let mut runtime = Runtime::start();
+    let runtime = Runtime::start();
     let mut client = runtime.connect();
     for name in ["PIPE", "XFSZ", "CHLD", "WINCH", "URG", "CONT"] {
         signal(runtime.pid(), name);
         client.settle();
     }
-    signal(runtime.pid(), "TERM");
-    assert!(runtime.end().0.success());
+    runtime.stop();
 }
 
 /// Beyond the limit of file sizes a write fails like one to a full disk.
@@ -81,7 +80,7 @@ fn a_record_beyond_the_limit_of_file_sizes_ends_with_an_error_and_clients_are_se
     let folder = Folder::new("limited-record");
     let path = folder.join("run.mcap");
     let arguments = ["--record", path.to_str().unwrap()];
-    let mut runtime = Runtime::under_with("ulimit -f 160", &arguments);
+    let runtime = Runtime::under_with("ulimit -f 160", &arguments);
     let mut client = runtime.connect();
     client.subscribe("/rosout");
     let told = client.message("/rosout");
@@ -96,8 +95,7 @@ fn a_record_beyond_the_limit_of_file_sizes_ends_with_an_error_and_clients_are_se
         "{text}"
     );
     client.settle();
-    signal(runtime.pid(), "TERM");
-    assert!(runtime.end().0.success());
+    runtime.stop();
     let mut recording = pendularm::record::Recording::new(File::open(&path).unwrap());
     assert!(
         recording.next_passage().unwrap().is_some(),
@@ -110,13 +108,12 @@ fn a_log_beyond_the_limit_of_file_sizes_affects_no_client() {
     let folder = Folder::new("limited-log");
     let path = folder.join("log");
     let prelude = format!("ulimit -f 1 && exec 2>'{}'", path.display());
-    let mut runtime = Runtime::under_with(&prelude, &["--log", "trace"]);
+    let runtime = Runtime::under_with(&prelude, &["--log", "trace"]);
     for _ in 0..20 {
         runtime.connect().settle();
     }
     assert!([512, 1024].contains(&fs::metadata(&path).unwrap().len()));
-    signal(runtime.pid(), "TERM");
-    assert!(runtime.end().0.success());
+    runtime.stop();
 }
 
 #[cfg(target_os = "linux")]

@@ -58,35 +58,3 @@ fn no_state_from_before_follows_the_response_to_a_reset() {
         client.ask("/arm_sim/pause", json!({"data": false}));
     }
 }
-
-/// More than a chunk, split at lengths that differ from those of the messages.
-#[test]
-fn a_flood_arrives_whole_and_in_order_in_every_spelling() {
-    const AT_ONCE: u64 = 1000;
-    let runtime = Runtime::start();
-    let mut subscribers = ["/flood", "flood"].map(|topic| {
-        let mut client = runtime.connect();
-        client.subscribe(topic);
-        (client, topic)
-    });
-    let mut publisher = runtime.connect();
-    publisher.send(&json!({"op": "advertise", "topic": "/flood"}));
-    for first in (0..5000).step_by(AT_ONCE as usize) {
-        let line = |n: u64| match n % 100 {
-            // Spelled so that it must be parsed.
-            98 => format!(
-                "{{\"msg\": {{\"n\":{n}}}, \"topic\": \"/flood\", \"op\": \"publish\"}}\r\n"
-            ),
-            _ => format!("{{\"op\":\"publish\",\"topic\":\"/flood\",\"msg\":{{\"n\":{n}}}}}\n"),
-        };
-        let stream: String = (first..first + AT_ONCE).map(line).collect();
-        for piece in stream.as_bytes().chunks(7919) {
-            publisher.send_bytes(piece);
-        }
-        for n in first..first + AT_ONCE {
-            for (client, topic) in &mut subscribers {
-                assert_eq!(client.message(topic)["n"], n);
-            }
-        }
-    }
-}

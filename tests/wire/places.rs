@@ -104,24 +104,6 @@ fn a_script_that_takes_all_places_leaves_the_reserved_one_to_pages_and_commands(
     assert_eq!(warnings.count(), 1, "{log:#?}");
 }
 
-#[test]
-fn one_place_and_two_are_served_too() {
-    let runtime = serving("1");
-    let alone = occupy(runtime.address, 1);
-    let told = refused(runtime.address, true);
-    assert!(
-        told.contains("serves 1 clients at once and keeps 0"),
-        "{told}"
-    );
-    drop(alone);
-    assert!(is_served_at_last(runtime.address));
-    let runtime = serving("2");
-    let _one = occupy(runtime.address, 1);
-    assert!(refused(runtime.address, false).contains("keeps 1"));
-    #[cfg(feature = "web")]
-    assert_eq!(crate::web_client::get(runtime.address, "/").status, 200);
-}
-
 /// A client that has only stopped sending keeps its place for 15 s while its call waits.
 #[cfg(target_os = "linux")]
 #[test]

@@ -1,34 +1,81 @@
-//! Records that are too short for a replay, and records with hostile texts.
+//! Records that the tests write themselves: too short ones, ones that differ, and ones with hostile texts.
 
 use std::fs::{self, File};
+use std::path::Path;
 
 use pendularm::record::{Content, INPUTS, McapWriter, RecordEntry, RunSettings};
 use serde_json::{Value, json};
 
 use crate::common::Runtime;
 use crate::folder::Folder;
-use crate::record::{end, passages, run, text};
+use crate::record::{passages, run, text};
+
+/// Records a run with one call.
+fn record(file: &Path) {
+    let runtime = Runtime::with(&["--record", text(file)]);
+    let mut client = runtime.connect();
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    runtime.stop();
+}
+
+/// Writes a record that has the first input of the one in `file`, and then this.
+fn write_instead(file: &Path, begin: &str, contents: impl IntoIterator<Item = Content>) {
+    let settings = RunSettings { links: 2, seed: 0 };
+    let mut writer = McapWriter::new(File::create(file).unwrap(), &settings).unwrap();
+    let note = begin.to_owned();
+    for content in [Content::Input { step: 0, note }]
+        .into_iter()
+        .chain(contents)
+    {
+        let log_time = 0;
+        writer.write(&RecordEntry { log_time, content }).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+/// The first input of a record: the whole simulation at its start.
+fn beginning(file: &Path) -> String {
+    let (passages, _) = passages(file);
+    let first = passages.into_iter().find(|one| one.topic == INPUTS);
+    let msg = first.unwrap().msg.unwrap();
+    msg["input"].as_str().unwrap().to_owned()
+}
+
+/// `tests/actors/recorder/replays.rs` has the steps and the values.
+#[test]
+fn a_difference_is_reported_with_its_step_and_by_the_exit_status() {
+    let folder = Folder::new("record-differs");
+    let file = folder.join("run.mcap");
+    record(&file);
+    let rest = vec![0.0; 2];
+    let states = [0, 10].map(|step| Content::State {
+        step,
+        position: rest.clone(),
+        velocity: rest.clone(),
+        effort: rest.clone(),
+    });
+    // Under gravity the arm does not stay at rest.
+    write_instead(&file, &beginning(&file), states);
+    let (status, said) = run(&["replay", text(&file)]);
+    assert_eq!(status, Some(1), "{said}");
+    assert!(
+        said.contains(": the same up to step 0, and at step 10"),
+        "{said}"
+    );
+}
 
 #[test]
 fn an_empty_record_and_one_that_was_cut_early_are_named_as_such() {
     let folder = Folder::new("record-short");
     let file = folder.join("run.mcap");
-    let runtime = Runtime::with(&["--record", text(&file)]);
-    runtime
-        .connect()
-        .ask("/arm_sim/pause", json!({"data": true}));
-    end(runtime);
+    record(&file);
     let whole = fs::read(&file).unwrap();
-    for (length, why) in [
-        (0, "the record was cut before its first state"),
-        (1, "the record was cut before its first state"),
-        (8, "the record was cut before its first state"),
-        (200, "the record was cut before its first state"),
-    ] {
+    let why = "the record was cut before its first state";
+    let expected = format!("pendularm: {}: {why}\n", file.display());
+    for length in [0, 1, 8, 200] {
         fs::write(&file, &whole[..length]).unwrap();
         let (status, said) = run(&["replay", text(&file)]);
-        let expected = format!("pendularm: {}: {why}\n", file.display());
-        assert_eq!((status, said), (Some(1), expected), "{length}");
+        assert_eq!((status, &said), (Some(1), &expected), "{length}");
     }
     let settings = RunSettings { links: 2, seed: 0 };
     let writer = McapWriter::new(File::create(&file).unwrap(), &settings).unwrap();
@@ -42,35 +89,11 @@ fn an_empty_record_and_one_that_was_cut_early_are_named_as_such() {
 fn texts_of_a_record_are_escaped_and_cut() {
     let folder = Folder::new("record-\u{1b}[31m-\u{202e}crafted");
     let file = folder.join("run.mcap");
-    let runtime = Runtime::with(&["--record", text(&file)]);
-    runtime
-        .connect()
-        .ask("/arm_sim/pause", json!({"data": true}));
-    end(runtime);
-    let first = passages(&file)
-        .0
-        .into_iter()
-        .find(|one| one.topic == INPUTS);
-    let begin = first.unwrap().msg.unwrap()["input"]
-        .as_str()
-        .unwrap()
-        .to_owned();
+    record(&file);
+    let begin = beginning(&file);
     let hostile = "\u{1b}[2J\u{202e}\r\n\u{9b}31m".repeat(100_000);
     let words = Value::from(&*hostile).to_string();
-    let note = |note: String| {
-        let file = File::create(&file).unwrap();
-        let mut writer = McapWriter::new(file, &RunSettings { links: 2, seed: 0 }).unwrap();
-        for note in [begin.clone(), note] {
-            let content = Content::Input { step: 0, note };
-            writer
-                .write(&RecordEntry {
-                    log_time: 0,
-                    content,
-                })
-                .unwrap();
-        }
-        writer.finish().unwrap();
-    };
+    let note = |note| write_instead(&file, &begin, [Content::Input { step: 0, note }]);
     let topic = || {
         let mut writer = mcap::Writer::new(File::create(&file).unwrap()).unwrap();
         let definition =

@@ -139,48 +139,27 @@ fn states() -> Vec<(&'static str, usize, Vec<u8>, Vec<u8>)> {
     let upgrade = frames::handshake("localhost", "/", "");
     let mut ping = Vec::new();
     frames::append(&mut ping, LAST | opcode::PING, [0; 4], &[7; 125]);
-    let once = |text: String| (text.into_bytes(), Vec::new());
-    [
-        (
+    let once = |name, clients, text: String| (name, clients, text.into_bytes(), Vec::new());
+    let no_end = |name, clients, first: String, flood| (name, clients, first.into_bytes(), flood);
+    let none = String::new;
+    let stability = line("/study/stability", &json!({})).repeat(16);
+    let integration = line("/arm_sim/integration_step", &millions);
+    let (arm, statuses) = (arm.repeat(10).into_bytes(), b"[]\n".repeat(10_000));
+    vec![
+        once(
             "computes references",
             20,
-            once(line("/study/rollout", &reference)),
+            line("/study/rollout", &reference),
         ),
-        (
-            "looks for stable timesteps",
-            20,
-            once(line("/study/stability", &json!({})).repeat(16)),
-        ),
-        (
-            "is stepped by hand",
-            20,
-            (pause.into_bytes(), steps.into_bytes()),
-        ),
-        (
-            "has an arm that is flooded",
-            50,
-            (Vec::new(), arm.repeat(10).into_bytes()),
-        ),
-        (
-            "encodes millions of numbers",
-            10,
-            once(line("/arm_sim/integration_step", &millions)),
-        ),
-        ("cannot follow its timestep", 1, once(too_fast)),
-        (
-            "has clients that read no statuses",
-            10,
-            (Vec::new(), b"[]\n".repeat(10_000)),
-        ),
-        ("reads slow frames", 5, (Vec::new(), goal.into_bytes())),
-        (
-            "is pinged without end",
-            5,
-            (upgrade.into_bytes(), ping.repeat(100)),
-        ),
+        once("looks for stable timesteps", 20, stability),
+        no_end("is stepped by hand", 20, pause, steps.into_bytes()),
+        no_end("has an arm that is flooded", 50, none(), arm),
+        once("encodes millions of numbers", 10, integration),
+        once("cannot follow its timestep", 1, too_fast),
+        no_end("has clients that read no statuses", 10, none(), statuses),
+        no_end("reads slow frames", 5, none(), goal.into_bytes()),
+        no_end("is pinged without end", 5, upgrade, ping.repeat(100)),
     ]
-    .map(|(name, clients, (first, flood))| (name, clients, first, flood))
-    .into()
 }
 
 #[test]

@@ -14,6 +14,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::arm_steps::pause;
+use crate::stage::stand_in;
 use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
@@ -35,11 +36,11 @@ const TURNS_PER_TICK: usize = 17;
 /// Turns after which a test gives up.
 const MANY_TURNS: usize = 1_000_000;
 
-/// All messages of the arm, in order.
-#[derive(Debug, Clone, PartialEq)]
-enum Said {
-    Tick,
-    Answer(u64, Answer),
+/// What the arm has sent: a number of ticks, and answers to clients, in order.
+#[derive(Default)]
+struct Said {
+    ticks: usize,
+    answers: Vec<(u64, Answer)>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -51,24 +52,7 @@ enum Answer {
     Other,
 }
 
-type Log = Arc<Mutex<Vec<Said>>>;
-
-/// Replaces the registry.
-struct TickEar(Log);
-
-impl Actor for TickEar {
-    type Context = Context<Self>;
-}
-
-impl Handler<Publish> for TickEar {
-    type Result = ();
-
-    fn handle(&mut self, publish: Publish, _: &mut Context<Self>) {
-        if publish.topic == Topic::JointStates {
-            self.0.lock().unwrap().push(Said::Tick);
-        }
-    }
-}
+type Log = Arc<Mutex<Said>>;
 
 /// Replaces a client.
 struct Client {
@@ -91,8 +75,8 @@ impl<T: 'static> Asker<T> for Client {
                 }
             }
         };
-        let said = Said::Answer(self.number, answer);
-        self.log.lock().unwrap().push(said);
+        let said = (self.number, answer);
+        self.log.lock().unwrap().answers.push(said);
     }
 
     fn is_gone(&self) -> bool {
@@ -109,7 +93,12 @@ struct TurnsBench {
 impl TurnsBench {
     async fn new() -> Self {
         let said = Log::default();
-        let publish = TickEar(Arc::clone(&said)).start().recipient();
+        let ticks = Arc::clone(&said);
+        let publish = stand_in(move |publish: Publish| {
+            if publish.topic == Topic::JointStates {
+                ticks.lock().unwrap().ticks += 1;
+            }
+        });
         let gauges = Arc::new(Gauges::default());
         let arm = ArmSim::new(Arm::default(), Gains::default(), publish, gauges).start();
         let topic = Topic::JointStates;
@@ -124,7 +113,7 @@ impl TurnsBench {
         bench.ask(0, pause(true));
         bench.ask(0, Reset::default());
         bench.until_answers(2).await;
-        bench.said.lock().unwrap().clear();
+        *bench.said.lock().unwrap() = Said::default();
         bench
     }
 
@@ -169,23 +158,11 @@ impl TurnsBench {
     }
 
     fn answered(&self) -> usize {
-        let said = self.said.lock().unwrap();
-        let answers = said.iter().filter(|one| **one != Said::Tick);
-        answers.count()
+        self.said.lock().unwrap().answers.len()
     }
 
     fn answers(&self) -> Vec<(u64, Answer)> {
-        let said = self.said.lock().unwrap();
-        let answers = said.iter().filter_map(|one| match one {
-            Said::Answer(client, answer) => Some((*client, answer.clone())),
-            Said::Tick => None,
-        });
-        answers.collect()
-    }
-
-    fn ticks(&self) -> usize {
-        let said = self.said.lock().unwrap();
-        said.iter().filter(|one| **one == Said::Tick).count()
+        self.said.lock().unwrap().answers.clone()
     }
 
     /// Asserts that the ticks of this number of turns have arrived. One may still be missing.
@@ -193,7 +170,7 @@ impl TurnsBench {
     fn assert_ticks(&self, turns: usize, of: &str) {
         let expected = turns / TURNS_PER_TICK;
         assert!(expected >= 3, "{of}: only {turns} turns");
-        let ticks = self.ticks();
+        let ticks = self.said.lock().unwrap().ticks;
         assert!(
             ticks + 1 >= expected,
             "{of}: {ticks} ticks in {turns} turns"

@@ -1,8 +1,9 @@
 //! The tick during floods of messages and endless steps.
 
 use super::*;
+use crate::arm_steps::{enable, of_timestep};
 use pendularm::actors::arm::sim::{
-    ArmPose, ArmSettings, Disturb, Enable, EndGoal, SetSetpoint, SimulationTime, TURN_MESSAGES,
+    ArmPose, ArmSettings, Disturb, EndGoal, SetSetpoint, SimulationTime, TURN_MESSAGES,
 };
 use pendularm::math::pid::Setpoint;
 
@@ -14,31 +15,13 @@ type Kind = (&'static str, bool, fn(&TurnsBench, usize));
 
 const KINDS: [Kind; 14] = [
     ("params", true, |bench, _| {
-        bench.ask(
-            1,
-            SetParams {
-                gravity: Some(9.7),
-                ..SetParams::default()
-            },
-        );
+        drop(bench.ask(1, SetParams::default()));
     }),
     ("gains", true, |bench, _| {
-        bench.ask(
-            1,
-            SetGains {
-                kp: Some([1.0, 2.0, 3.0]),
-                ..SetGains::default()
-            },
-        );
+        drop(bench.ask(1, SetGains::default()));
     }),
-    ("methods", true, |bench, _| {
-        bench.ask(
-            1,
-            SetIntegrator {
-                method: Some(Method::Euler),
-                ..SetIntegrator::default()
-            },
-        );
+    ("timesteps", true, |bench, n| {
+        drop(bench.ask(1, of_timestep(1e-3 + 1e-9 * n as f64)));
     }),
     ("pushes", true, |bench, _| {
         bench.ask(
@@ -50,14 +33,8 @@ const KINDS: [Kind; 14] = [
             },
         );
     }),
-    ("switches", true, |bench, _| {
-        bench.ask(
-            1,
-            Enable {
-                enabled: Some(true),
-                ..Enable::default()
-            },
-        );
+    ("switches", true, |bench, n| {
+        drop(bench.ask(1, enable(n % 2 == 0)));
     }),
     ("resumes", true, |bench, _| drop(bench.ask(1, pause(false)))),
     ("steps", true, |bench, _| drop(bench.step(1, 1))),

@@ -1,50 +1,14 @@
 //! A client that reads half of its messages gets current ones if the number of its unread bytes is known.
 
 use std::cell::Cell;
-use std::pin::Pin;
 use std::rc::Rc;
 use std::sync::Arc;
-use std::task::{Context, Poll};
 
 use super::*;
+use crate::virtual_time::Watched;
 use pendularm::actors::gateway::connection::{Connection, Ends};
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, DuplexStream, ReadBuf, duplex};
+use tokio::io::{AsyncReadExt, duplex};
 use tokio::time::Instant;
-
-/// A pipe whose bytes are counted as they are written.
-struct Counted(DuplexStream, Rc<Cell<usize>>);
-
-impl AsyncRead for Counted {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<std::io::Result<()>> {
-        Pin::new(&mut self.0).poll_read(cx, buffer)
-    }
-}
-
-impl AsyncWrite for Counted {
-    fn poll_write(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<std::io::Result<usize>> {
-        let polled = Pin::new(&mut self.0).poll_write(cx, bytes);
-        if let Poll::Ready(Ok(written)) = polled {
-            self.1.set(self.1.get() + written);
-        }
-        polled
-    }
-
-    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
-        Pin::new(&mut self.0).poll_flush(cx)
-    }
-
-    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
-        Pin::new(&mut self.0).poll_shutdown(cx)
-    }
-}
 
 /// Thirty seconds of 60 messages a second for a client that takes `a_second` of them, and reads `chunk` bytes at a
 /// time. Returns its longest delay, and the number of its messages.
@@ -52,13 +16,16 @@ async fn lateness(queue_length: u64, a_second: u32, chunk: usize) -> (Duration, 
     let gateway = Gateway::bare().await;
     let unread = Rc::new(Cell::new(0));
     let (mut client, theirs) = duplex(WIDE);
+    let mut theirs = Watched::new(theirs);
+    let count = Rc::clone(&unread);
+    theirs.on_write = Box::new(move |bytes| count.set(count.get() + bytes.len()));
     let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
     let source = Rc::clone(&unread);
     Connection::start_reading(
         Box::new(move || Some(source.get())),
         Arc::default(),
         Ends::default(),
-        Counted(theirs, Rc::clone(&unread)),
+        theirs,
         registry,
         gauges,
     );

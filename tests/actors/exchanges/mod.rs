@@ -12,6 +12,7 @@
 //! | `a < pattern` | the next frame that `a` receives matches |
 //! | `a << pattern` | a later frame matches; the frames before it are dropped |
 //! | `a ~ text` | the frame that `a` received last contains this text, byte by byte |
+//! | `a told text` | client `a` sends this frame, and the next frame that it receives is a status that informs it |
 //! | `a listen topic` | subscribes to a topic and receives the confirmation |
 //! | `a call service args = pattern` | the call succeeds, and its values match |
 //! | `a refused service args = text` | the call fails with a status that contains this text |
@@ -33,9 +34,11 @@
 //! | `steps = 1`, `params = 1` | this many calls are kept |
 //! | `answer steps json` | the oldest of them succeeds with these values, or with none, and ends; `reply` leaves it open until `release`, `refuse steps why` refuses it, `lose steps` drops it, and `gone steps` drops it if its client has left |
 //! | `connections = 1`, `dropped = 1`, `taken = 1` | clients that are served, messages that were dropped, permits for long frames that are taken |
+//! | `workers busy`, `workers free` | from here on all threads for long frames and for lists are occupied, or free |
 //! | `shutting down`, `finish all` | the two messages by which the runtime ends its clients |
 //! | `floating` | gravity and gains are zero and the controller is on: an arm at rest stays where it is |
 //! | `for x \| y in 1 \| a; 2 \| b` | the steps up to `end` run once for each row, with its values in place of `@x` and `@y` |
+//! | `for x in 1; 2 do step` | the same for this one step |
 //! | `for x in 0..9` | the same for each number, without the last, which may be a limit |
 //! | `for x in` | the same for each row of the lines below it, which begin with `\| ` |
 //!
@@ -56,7 +59,6 @@ mod patterns;
 mod peer;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -66,9 +68,9 @@ use self::peer::{LONG_PATIENCE, Peer, SHORT_PATIENCE, ask};
 use crate::nodes::{start_whole, work_in_this_thread};
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
-use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::messages::{FinishAll, RefuseCalls};
+use pendularm::actors::resources::long_work::{PLACES, WorkKind, WorkPermit};
 use pendularm::actors::resources::memory::Memory;
 use pendularm::options::{Options, Parsed};
 use pendularm::protocol::catalog::{Rosapi, Service};
@@ -76,7 +78,7 @@ use pendularm::protocol::catalog::{Rosapi, Service};
 use pendularm::web::Site;
 use pendularm_client::pipe;
 use serde_json::{Value, json};
-use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
+use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 use tokio::time::{Instant, advance, sleep, timeout};
 
 /// Longest virtual time until a frame arrives after others.
@@ -128,6 +130,8 @@ struct World {
     bound: BTreeMap<String, Value>,
     kept: KeptCalls,
     marked: Instant,
+    /// The places for long work that are occupied.
+    busy: Vec<WorkPermit>,
 }
 
 impl World {
@@ -153,19 +157,12 @@ impl World {
             bound: BTreeMap::new(),
             kept,
             marked: Instant::now(),
+            busy: Vec::new(),
         }
     }
 
-    /// The client's end of a new connection, whose pipe holds `room` bytes each way.
     fn open(&self, room: usize) -> DuplexStream {
-        let (ours, theirs) = duplex(room);
-        let (registry, gauges) = (
-            self.gateway.registry.clone(),
-            Arc::clone(&self.gateway.gauges),
-        );
-        let local = SocketAddr::from(([127, 0, 0, 1], 9095));
-        Connection::start_with(Arc::clone(&self.admission), local, theirs, registry, gauges);
-        ours
+        self.gateway.open(Arc::clone(&self.admission), room)
     }
 
     async fn connect(&self, name: &str, room: usize) -> Peer {
@@ -251,10 +248,20 @@ impl World {
                 }
             }
             "connections" | "dropped" | "taken" | "steps" | "params" => {
-                self.kept.count(&self.gateway, name, rest)?;
+                self.kept
+                    .count(&self.gateway, name, &expand(rest, &self.bound))?;
             }
             "answer" | "reply" | "refuse" | "lose" | "gone" => self.kept.decide(name, rest).await?,
             "release" => self.kept.release().await,
+            "workers" => {
+                self.busy.clear();
+                for kind in [WorkKind::Long, WorkKind::Listing].repeat(PLACES) {
+                    if rest == "busy" {
+                        self.busy.extend(WorkPermit::take(kind).await);
+                    }
+                }
+                settle().await;
+            }
             "shutting" => {
                 let refuse = RefuseCalls("shutting down");
                 let sent = self.gateway.registry.send(refuse).await;
@@ -312,8 +319,10 @@ impl World {
             }
             "~" if peer.last.contains(rest) => {}
             "~" => return Err(format!("not in {}", peer.last)),
-            "listen" => {
-                peer.send(&json!({"op": "subscribe", "topic": rest}).to_string())
+            "listen" | "told" => {
+                let subscribe = json!({"op": "subscribe", "topic": rest}).to_string();
+                let told = expand(rest, &self.bound);
+                peer.send(if verb == "told" { &told } else { &subscribe })
                     .await;
                 let got = peer.next().await?;
                 check(
@@ -379,6 +388,10 @@ fn unroll(mut steps: &[Step]) -> Vec<Step> {
             all.push(step.clone());
             continue;
         };
+        let (header, only) = match header.split_once(" do ") {
+            Some((header, only)) => (header, Some([(step.0, only.to_owned())])),
+            None => (header, None),
+        };
         let (names, rows) = header.split_once(" in").expect("a loop has values");
         let count = steps.iter().take_while(|(_, line)| line.starts_with("| "));
         let (below, rest) = steps.split_at(count.count());
@@ -392,17 +405,24 @@ fn unroll(mut steps: &[Step]) -> Vec<Step> {
         };
         let mut depth = 1;
         let ends = |(_, line): &Step| {
-            depth += i32::from(line.starts_with("for ")) - i32::from(line == "end");
+            let begins = line.starts_with("for ") && !line.contains(" do ");
+            depth += i32::from(begins) - i32::from(line == "end");
             depth == 0
         };
-        let length = rest.iter().position(ends).expect("a loop has an end");
+        let (body, rest) = match &only {
+            Some(only) => (&only[..], rest),
+            None => {
+                let length = rest.iter().position(ends).expect("a loop has an end");
+                (&rest[..length], &rest[length + 1..])
+            }
+        };
         for row in rows {
             let values: Vec<(&str, &str)> = names.split(" | ").zip(row.split(" | ")).collect();
-            let body = rest[..length].iter();
+            let body = body.iter();
             let body = body.map(|(number, line)| (*number, replace(line, &values)));
             all.extend(unroll(&body.collect::<Vec<_>>()));
         }
-        steps = &rest[length + 1..];
+        steps = rest;
     }
     all
 }
@@ -476,98 +496,44 @@ fn play(file: &str) {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-#[test]
-fn topics_of_clients() {
-    play("topics");
+/// A test for each file.
+macro_rules! exchanges {
+    ($($(#[$only:meta])* $name:ident: $file:literal,)+) => {
+        $(
+            $(#[$only])*
+            #[test]
+            fn $name() {
+                play($file);
+            }
+        )+
+    };
 }
 
-#[test]
-fn services_of_clients() {
-    play("services");
-}
-
-#[test]
-fn actions_of_clients_and_of_the_runtime() {
-    play("actions");
-}
-
-#[test]
-fn frames_in_pieces_and_malformed_frames() {
-    play("frames");
-}
-
-#[test]
-fn names_and_ids() {
-    play("names");
-}
-
-#[test]
-fn rosapi_and_parameters() {
-    play("rosapi");
-}
-
-#[test]
-fn messages_and_refusals_of_the_arm() {
-    play("arm");
-}
-
-#[test]
-fn calls_and_ends_of_connections() {
-    play("connections");
-}
-
-#[test]
-fn room_for_what_is_long() {
-    play("memory");
-}
-
-#[test]
-fn places_and_the_way_to_them() {
-    play("places");
-}
-
-#[test]
-fn goals_of_inverse_kinematics() {
-    play("goals");
-}
-
-#[test]
-fn trials() {
-    play("trials");
-}
-
-#[test]
-fn paths() {
-    play("paths");
-}
-
-#[test]
-fn frames_for_web_viewers() {
-    play("tf_web");
-}
-
-#[cfg(feature = "web")]
-#[test]
-fn exchanges_over_websocket() {
-    play("web");
-}
-
-#[cfg(feature = "web")]
-#[test]
-fn life_and_ends_of_websockets() {
-    play("sockets");
-}
-
-#[cfg(feature = "web")]
-#[test]
-fn heads_of_requests() {
-    play("heads");
-}
-
-#[cfg(feature = "web")]
-#[test]
-fn requests_over_http() {
-    play("http");
+exchanges! {
+    topics_of_clients: "topics",
+    services_of_clients: "services",
+    actions_of_clients_and_of_the_runtime: "actions",
+    frames_in_pieces_and_malformed_frames: "frames",
+    messages_in_pieces_and_long_frames: "encodings",
+    names_and_ids: "names",
+    rosapi_and_parameters: "rosapi",
+    messages_and_refusals_of_the_arm: "arm",
+    calls_and_ends_of_connections: "connections",
+    room_for_what_is_long: "memory",
+    places_and_the_way_to_them: "places",
+    goals_of_inverse_kinematics: "goals",
+    trials: "trials",
+    clocks_and_the_estimated_error: "clocks",
+    paths: "paths",
+    frames_for_web_viewers: "tf_web",
+    #[cfg(feature = "web")]
+    exchanges_over_websocket: "web",
+    #[cfg(feature = "web")]
+    life_and_ends_of_websockets: "sockets",
+    #[cfg(feature = "web")]
+    heads_of_requests: "heads",
+    #[cfg(feature = "web")]
+    requests_over_http: "http",
 }
 
 /// Under either prefix, and with or without the leading slash.

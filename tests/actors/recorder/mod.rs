@@ -22,7 +22,7 @@ use crate::system::in_virtual_time;
 
 /// Entries in the order in which they are reported.
 #[derive(Clone, Default)]
-pub struct Notes(Arc<Mutex<Noted>>);
+struct Notes(Arc<Mutex<Noted>>);
 
 #[derive(Default)]
 struct Noted {
@@ -38,12 +38,12 @@ impl Notes {
         noted.entries.push(RecordEntry { log_time, content });
     }
 
-    pub fn entries(&self) -> Vec<RecordEntry> {
+    fn entries(&self) -> Vec<RecordEntry> {
         self.0.lock().unwrap().entries.clone()
     }
 
     /// Starts to record all messages.
-    pub async fn take<const N: usize>(&self, stage: &Stage<N>) {
+    async fn take<const N: usize>(&self, stage: &Stage<N>) {
         let (of_arm, of_registry) = (self.clone(), self.clone());
         let listener = listeners::arm::<N>(move |content| {
             of_arm.put(content);
@@ -85,7 +85,7 @@ pub fn replayed(entries: &[RecordEntry]) -> ReplayVerdict {
     replay(&*file(entries)).unwrap()
 }
 
-pub async fn stop<const N: usize>(stage: &Stage<N>) {
+async fn stop<const N: usize>(stage: &Stage<N>) {
     stage.arm.send(SetListener::<N>(None)).await.unwrap();
     stage.registry.send(SetTap(None)).await.unwrap();
 }
@@ -152,7 +152,7 @@ async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::R
     client.call(service, args).await;
 }
 
-async fn random_run<const N: usize>(seed: u64) -> Vec<RecordEntry> {
+pub async fn random_run<const N: usize>(seed: u64) -> Vec<RecordEntry> {
     let stage = Stage::<N>::with_seed(seed).await;
     let mut client = stage.connect();
     let mut rng = fastrand::Rng::with_seed(seed);

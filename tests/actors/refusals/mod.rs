@@ -265,28 +265,6 @@ fn valid_fields_are_echoed_alone_and_by_their_places() {
 }
 
 #[test]
-fn null_in_an_optional_field_means_absent_where_a_bad_field_rejects_all() {
-    in_virtual_time(async {
-        for (service, field) in [
-            ("/arm_sim/integration_step", "xdot0"),
-            ("/arm_sim/step", "effort"),
-            ("/ik/solve", "phi"),
-            ("/ik_action/send_goal", "epsilon"),
-            ("/ik_action/send_goal", "success_hold"),
-            ("/ik_trial/start", "duration"),
-            ("/ik_action/cancel_goal", "goal_id"),
-        ] {
-            let (_gateway, mut client) = start::<3>().await;
-            if service.ends_with("cancel_goal") {
-                call(&mut client, "/ik_action/send_goal", "{\"x\":1,\"y\":1}").await;
-            }
-            let answer = call(&mut client, service, &request(service, &[(field, "null")])).await;
-            assert_eq!(answer["result"], true, "{service} {field}: {answer}");
-        }
-    });
-}
-
-#[test]
 fn arguments_of_another_form_and_too_many_are_refused() {
     in_virtual_time(async {
         let (_gateway, mut client) = start::<2>().await;

@@ -14,13 +14,12 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use crate::askers::{PATIENCE, PoolBench, ask_as};
-use crate::stage::{ms, pass};
+use crate::stage::{ms, pass, stand_in};
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
     ArmSettings, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetLimitPredictor, SetParams,
-    SetPeriod,
 };
 use pendularm::actors::compute::study::{
     IntegrationStep, PlanRun, PredictStability, Refused, RunOffline, Study, SuggestGains,
@@ -36,7 +35,6 @@ use pendularm::math::simulation::{ControlPeriod, Simulation};
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::study::clocks::{ClockLimits, clock_limits};
 use pendularm::study::control_loop::{ControlLoop, no_control};
-use pendularm::study::error_estimate::estimate;
 use pendularm::study::gains::{GainsRequirements, search_gains};
 use pendularm::study::motion::Motion;
 use pendularm::study::paused::at_once;
@@ -45,13 +43,6 @@ use pendularm::study::stability::{Limits, limit_held, limits};
 use serde_json::{Value, json};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{sleep, timeout};
-
-/// An arm with settings of its own, none of them the default.
-pub struct SettledArm<const N: usize>;
-
-impl<const N: usize> Actor for SettledArm<N> {
-    type Context = Context<Self>;
-}
 
 fn settings<const N: usize>() -> Present<N> {
     Present {
@@ -87,18 +78,14 @@ fn settings_as_args<const N: usize>() -> Value {
     })
 }
 
-impl<const N: usize> Handler<ArmSettings<N>> for SettledArm<N> {
-    type Result = MessageResult<ArmSettings<N>>;
-
-    fn handle(&mut self, _: ArmSettings<N>, _: &mut Context<Self>) -> Self::Result {
-        MessageResult(settings())
-    }
+/// An arm with settings of its own, none of them the default.
+pub fn settled_arm<const N: usize>() -> Recipient<ArmSettings<N>> {
+    stand_in(|_| settings())
 }
 
 /// The node on a pool with one worker.
 pub fn study<const N: usize>() -> PoolBench<Study<N>> {
-    let arm = SettledArm::<N>.start();
-    PoolBench::new(|pool| Study::new(arm.recipient(), pool))
+    PoolBench::new(|pool| Study::new(settled_arm(), pool))
 }
 
 /// A client that calls the node.

@@ -47,8 +47,8 @@ async fn assert_predictions_are_the_studys<const N: usize>() {
     assert_eq!((predicted.limits, predicted.motion), (expected, motion));
     let written = stability_values(&expected, &clock_limits(&control), &motion);
     let all = settings_as_args::<N>();
-    let nulls =
-        json!({"integrator": null, "gains": {"kp": null}, "params": null, "setpoint": null});
+    let nulls = json!({"integrator": null, "gains": {"kp": null, "colour": "red"}, "params": null,
+        "setpoint": null});
     for args in [json!({}), all, nulls] {
         assert_eq!(client.ask(Service::Stability.name(), args).await, written);
     }

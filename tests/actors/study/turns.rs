@@ -53,7 +53,7 @@ fn light_requests_are_answered_between_slices_of_heavy_ones() {
 async fn turns_until_integrated(others: u64) -> u32 {
     let (answered, mut order) = mpsc::unbounded_channel();
     let pool = WorkerPool::without_threads();
-    let node = Study::new(SettledArm::<2>.start().recipient(), pool.clone()).start();
+    let node = Study::new(settled_arm::<2>(), pool.clone()).start();
     let (study, integration) = (node.clone().recipient(), node.recipient());
     for connection in 1..=others {
         ask_as(&study, connection, &answered, heavy());

@@ -47,13 +47,13 @@ fn clients_that_take_no_byte_of_a_file_keep_others_from_files_for_a_time_only() 
         let began = Instant::now();
         let mut deaf = Vec::new();
         for _ in 0..FILES {
-            let mut stream = connect_through(&gateway, &admission, 1024);
+            let mut stream = gateway.open(Arc::clone(&admission), 1024);
             stream.write_all(request.as_bytes()).await.unwrap();
             assert_eq!(stream.read_u8().await.unwrap(), b'H');
             deaf.push(stream);
         }
         sleep(ANSWER_TIME - Duration::from_secs(1)).await;
-        let mut late = connect_through(&gateway, &admission, WIDE);
+        let mut late = gateway.open(Arc::clone(&admission), WIDE);
         late.write_all(request.as_bytes()).await.unwrap();
         assert_eq!(late.read_u8().await.unwrap(), b'H');
         assert_elapsed(began, ANSWER_TIME);
@@ -74,7 +74,7 @@ fn a_file_of_a_report_that_is_too_long_is_refused() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (folder, admission) = report_of("longer", MAX_FILE + 1);
-        let mut stream = connect_through(&gateway, &admission, WIDE);
+        let mut stream = gateway.open(Arc::clone(&admission), WIDE);
         stream.write_all(file_request().as_bytes()).await.unwrap();
         let answer = rest(&mut stream).await;
         assert!(answer.starts_with("HTTP/1.1 503 "), "{answer}");

@@ -8,9 +8,9 @@ use crate::common::Runtime;
 #[test]
 fn diagnostics_are_a_page_and_their_exit_status_shows_whether_every_part_is_ok() {
     let runtime = Runtime::start();
-    let page = said(&runtime, &["diagnostics"]);
+    let page = said(&runtime, "diagnostics");
     assert!(page.starts_with("OK arm_sim: running\n  state "), "{page}");
-    assert_eq!(json_of(&runtime, &["diagnostics"])["status"][0]["level"], 0);
+    assert_eq!(json_of(&runtime, "diagnostics")["status"][0]["level"], 0);
     let mut client = runtime.connect();
     client.ask(
         "/pid_controller/set_gains",
@@ -23,7 +23,7 @@ fn diagnostics_are_a_page_and_their_exit_status_shows_whether_every_part_is_ok()
     client.receive_where("a divergence", |frame| {
         frame["topic"] == "/diagnostics" && frame["msg"]["status"][0]["level"] == 2
     });
-    let output = ask(&runtime, &["diagnostics"]);
+    let output = ask(&runtime, "diagnostics");
     assert_eq!(output.status.code(), Some(1));
     let page = String::from_utf8(output.stdout).unwrap();
     assert!(page.starts_with("ERROR arm_sim: diverged: "), "{page}");

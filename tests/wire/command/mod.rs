@@ -17,6 +17,20 @@ use serde_json::Value;
 
 use crate::common::{self, Runtime, signal};
 
+/// The words of a command line; quoted ones are unchanged.
+fn words(line: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut is_quoted = false;
+    for one in line.chars() {
+        match one {
+            '\'' => is_quoted = !is_quoted,
+            ' ' if !is_quoted => words.push(String::new()),
+            _ => words.last_mut().unwrap().push(one),
+        }
+    }
+    words
+}
+
 /// A command with the address of a runtime, ready to be started.
 fn command(runtime: &Runtime, arguments: &[&str]) -> std::process::Command {
     let mut command = common::program();
@@ -31,38 +45,41 @@ fn command(runtime: &Runtime, arguments: &[&str]) -> std::process::Command {
     command
 }
 
-fn ask(runtime: &Runtime, arguments: &[&str]) -> Output {
-    command(runtime, arguments).output().unwrap()
+/// The same for a command line.
+fn command_line(runtime: &Runtime, line: &str) -> std::process::Command {
+    let words = words(line);
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    command(runtime, &words)
+}
+
+fn ask(runtime: &Runtime, line: &str) -> Output {
+    command_line(runtime, line).output().unwrap()
 }
 
 /// Standard output of a command that has to succeed.
 #[track_caller]
-fn said(runtime: &Runtime, arguments: &[&str]) -> String {
-    let output = ask(runtime, arguments);
+fn said(runtime: &Runtime, line: &str) -> String {
+    let output = ask(runtime, line);
     let complaint = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {complaint}");
-    assert_eq!(complaint, "", "{arguments:?}");
+    assert_eq!(output.status.code(), Some(0), "{line}: {complaint}");
+    assert_eq!(complaint, "", "{line}");
     String::from_utf8(output.stdout).unwrap()
 }
 
 /// The same, in JSON.
 #[track_caller]
-fn json_of(runtime: &Runtime, arguments: &[&str]) -> Value {
-    let text = said(runtime, &[arguments, &["--json"]].concat());
+fn json_of(runtime: &Runtime, line: &str) -> Value {
+    let text = said(runtime, &format!("{line} --json"));
     assert_eq!(text.lines().count(), 1, "{text}");
     serde_json::from_str(&text).unwrap()
 }
 
 /// The error line of a command that must be refused with this exit status.
 #[track_caller]
-fn refusal(runtime: &Runtime, arguments: &[&str], status: i32) -> String {
-    let output = ask(runtime, arguments);
+fn refusal(runtime: &Runtime, line: &str, status: i32) -> String {
+    let output = ask(runtime, line);
     let complaint = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(
-        output.status.code(),
-        Some(status),
-        "{arguments:?}: {complaint}"
-    );
+    assert_eq!(output.status.code(), Some(status), "{line}: {complaint}");
     assert_eq!(complaint.lines().count(), 1, "{complaint}");
     assert!(output.stdout.is_empty());
     complaint
@@ -76,8 +93,8 @@ fn refusal(runtime: &Runtime, arguments: &[&str], status: i32) -> String {
 struct Going(Child, BufReader<std::process::ChildStdout>);
 
 impl Going {
-    fn start(runtime: &Runtime, arguments: &[&str]) -> Self {
-        let mut child = command(runtime, arguments)
+    fn start(runtime: &Runtime, line: &str) -> Self {
+        let mut child = command_line(runtime, line)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()

@@ -1,4 +1,4 @@
-//! The command line as beginners type it: unknown fields, addresses in any form, the controller still off.
+//! The command line as beginners type it: unknown fields, and the controller still off.
 
 use serde_json::json;
 
@@ -37,21 +37,18 @@ fn a_field_that_is_not_there_is_refused_by_name_and_nothing_is_sent() {
     for row in UNKNOWN_FIELDS.trim().lines() {
         let [command, name, value, wrong, right] =
             row.split(" | ").collect::<Vec<_>>().try_into().expect(row);
-        let words: Vec<&str> = command.split(' ').chain([name, value]).collect();
-        let refused = refusal(&runtime, &words, 2);
+        let line = format!("{command} {name} '{value}'");
+        let refused = refusal(&runtime, &line, 2);
         assert!(
             refused.contains(wrong) && refused.contains(right),
-            "{words:?}: {refused}"
+            "{line}: {refused}"
         );
     }
     // The client receives the first message that is published afterwards: this one.
     client.ask(ENABLE, json!({"data": true}));
-    let stamped =
-        "{header: {seq: 1, stamp: {secs: 0, nsecs: 0}}, points: [{positions: [0.1, 0.2]}]}";
-    said(
-        &runtime,
-        &["topic", "pub", "-1", "/joint_trajectory", stamped],
-    );
+    let stamped = "header: {seq: 1, stamp: {secs: 0, nsecs: 0}}, points: [{positions: [0.1, 0.2]}]";
+    let line = format!("topic pub -1 /joint_trajectory '{{{stamped}}}'");
+    said(&runtime, &line);
     let received = client.message("/joint_trajectory");
     assert_eq!(received["points"][0]["positions"], json!([0.1, 0.2]));
     assert_eq!(
@@ -66,27 +63,28 @@ fn types_that_the_runtime_does_not_know_have_any_field() {
     let mut client = runtime.connect();
     common::provide(&mut client, "/own");
     let call = std::thread::spawn({
-        let arguments = ["service", "call", "/own", "{any: {thing: 1}, b:c: 2}"];
-        let mut command = super::command(&runtime, &arguments);
+        let line = "service call /own '{any: {thing: 1}, b:c: 2}'";
+        let mut command = super::command_line(&runtime, line);
         move || command.output().unwrap()
     });
-    let asked = common::forwarded(&mut client);
+    let asked = client.receive_where("call", |frame| frame["op"] == "call_service");
     assert_eq!(asked["args"], json!({"any": {"thing": 1}, "b:c": 2}));
-    common::respond(&mut client, &asked, json!({}));
+    client.send(
+        &json!({"op": "service_response", "service": "/own", "id": asked["id"], "values": {},
+            "result": true}),
+    );
     assert_eq!(call.join().unwrap().status.code(), Some(0));
-    let own = ["topic", "pub", "-1", "/own", "own_msgs/msg/Own", "{any: 1}"];
-    said(&runtime, &own);
+    said(&runtime, "topic pub -1 /own own_msgs/msg/Own '{any: 1}'");
 }
 
 #[test]
 fn a_command_that_moves_the_arm_hints_that_the_controller_is_off() {
     let runtime = Runtime::start();
-    let point = "points: [{positions: [0.3, -0.5]}]";
     let commands = [
-        &["topic", "pub", "-1", "joint_trajectory", point][..],
-        &["service", "call", "/ik_action/send_goal", "{x: 1, y: 1}"],
-        &["service", "call", "/ik_trial/start"],
-        &["topic", "echo", "/clock", "--once"],
+        "topic pub -1 joint_trajectory 'points: [{positions: [0.3, -0.5]}]'",
+        "service call /ik_action/send_goal '{x: 1, y: 1}'",
+        "service call /ik_trial/start",
+        "topic echo /clock --once",
     ];
     for (command, count) in commands.iter().zip([1, 1, 1, 0]) {
         let output = ask(&runtime, command);
@@ -98,50 +96,11 @@ fn a_command_that_moves_the_arm_hints_that_the_controller_is_off() {
             "{hint}"
         );
     }
-    said(&runtime, &["service", "call", ENABLE, "{data: true}"]);
+    said(
+        &runtime,
+        "service call /pid_controller/enable '{data: true}'",
+    );
     for command in commands {
         said(&runtime, command);
-    }
-}
-
-#[test]
-fn an_address_has_any_form_and_any_place() {
-    let runtime = Runtime::start();
-    let port = runtime.address.port();
-    let output = |words: &[&str]| common::program().args(words).output().unwrap();
-    for address in [
-        format!("{port}"),
-        format!(":{port}"),
-        format!("localhost:{port}"),
-        format!("ws://127.0.0.1:{port}/"),
-        format!("http://127.0.0.1:{port}/?token=none"),
-    ] {
-        for words in [
-            &["topic", "--connect", &address, "list"][..],
-            &["topic", "list", "--connect", &address],
-        ] {
-            let said = output(words);
-            let words = format!("{words:?}: {}", String::from_utf8_lossy(&said.stderr));
-            assert!(said.stdout.starts_with(b"/"), "{words}");
-        }
-    }
-    let address = port.to_string();
-    let before = [
-        "topic",
-        "--json",
-        "--timeout",
-        "60",
-        "--token",
-        "no-token-is-asked-for",
-        "--connect",
-        &address,
-    ];
-    let said = output(&[&before[..], &["list"]].concat());
-    assert!(said.stdout.starts_with(b"{\"name\":\"/"), "{said:?}");
-    for words in [&["plan", "--error", "1"][..], &["topic", "list"]] {
-        let said = output(&[&["--connect", &address], words].concat());
-        let complaint = String::from_utf8(said.stderr).unwrap();
-        assert_eq!(said.status.code(), Some(2), "{complaint}");
-        assert!(complaint.contains("--connect"), "{complaint}");
     }
 }

@@ -3,24 +3,11 @@
 //! A paragraph begins with `# ` and its statement, and uses its own runtime. A row is an exit status, the arguments as
 //! a shell reads them, ` = ` and a part of the output. With ` == ` it is the whole output. Both may have the escapes of
 //! JSON. A successful command writes nothing to standard error. A failed one writes one line there and nothing else.
-//! `%3*x%` is `xxx`. A row that begins with `!` has no address of the runtime.
+//! `%3*x%` is `xxx`. A row that begins with `!` has no address of the runtime other than `$ADDRESS`, whose port is
+//! `$PORT`.
 
-use super::ask;
+use super::{command, words};
 use crate::common::{self, Runtime};
-
-/// The words of a line; quoted ones are unchanged.
-fn words(line: &str) -> Vec<String> {
-    let mut words = vec![String::new()];
-    let mut is_quoted = false;
-    for one in line.chars() {
-        match one {
-            '\'' => is_quoted = !is_quoted,
-            ' ' if !is_quoted => words.push(String::new()),
-            _ => words.last_mut().unwrap().push(one),
-        }
-    }
-    words
-}
 
 /// A word with its line ends and its repetition written out.
 fn expand(word: &str) -> String {
@@ -35,6 +22,8 @@ fn expand(word: &str) -> String {
 
 /// The fault of a row, if it has one.
 fn fault(runtime: &Runtime, row: &str) -> Option<String> {
+    let row = &row.replace("$ADDRESS", &runtime.address.to_string());
+    let row = &row.replace("$PORT", &runtime.address.port().to_string());
     let (status, rest) = row.split_once(' ').unwrap();
     let (arguments, part) = rest.split_once(" =").expect(row);
     let is_whole = part.starts_with('=');
@@ -44,7 +33,7 @@ fn fault(runtime: &Runtime, row: &str) -> Option<String> {
     let part: String = serde_json::from_str(&format!("\"{part}\"")).expect(row);
     let output = match status.strip_prefix('!') {
         Some(_) => common::program().args(arguments).output().unwrap(),
-        None => ask(runtime, &arguments),
+        None => command(runtime, &arguments).output().unwrap(),
     };
     let status = status.trim_start_matches('!');
     let [said, complaint] =

@@ -7,15 +7,7 @@ use std::process::Command;
 fn without_the_feature_no_crate_of_the_web_door_is_built_in() {
     let tree = |arguments: &[&str]| {
         let output = Command::new(env!("CARGO"))
-            .args([
-                "tree",
-                "--locked",
-                "--offline",
-                "--edges",
-                "normal",
-                "--prefix",
-                "none",
-            ])
+            .args("tree --locked --offline --edges normal --prefix none".split(' '))
             .args(arguments)
             .current_dir(env!("CARGO_MANIFEST_DIR"))
             .output()

@@ -6,7 +6,7 @@ use std::process::Stdio;
 
 use crate::common::{Logged, Runtime, program};
 use crate::folder::Folder;
-use crate::web_client::{get, handshake, try_handshake};
+use crate::web_client::{exchange, get, handshake};
 use pendularm::web::page::ASSETS;
 
 #[test]
@@ -78,7 +78,8 @@ fn the_log_names_the_pages_address_at_the_start() {
 fn the_log_names_the_option_for_a_foreign_origin() {
     let mut runtime = Logged::start(program(), Stdio::null());
     let headers = handshake(runtime.address) + "Origin: https://class.example\r\n";
-    try_handshake(runtime.address, "/", &headers);
+    let request = format!("GET / HTTP/1.1\r\n{headers}\r\n");
+    exchange(runtime.address, request.as_bytes());
     let line = runtime.await_line("--allow-origin");
     assert!(line.contains("WARN"), "{line}");
     assert!(line.contains("https://class.example"), "{line}");

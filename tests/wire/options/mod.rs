@@ -4,10 +4,7 @@
 
 mod arguments;
 mod commands;
-mod help;
 mod program;
-#[cfg(feature = "record")]
-mod record;
 mod values;
 mod variables;
 

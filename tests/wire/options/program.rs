@@ -29,40 +29,6 @@ fn as_json_the_reason_for_not_starting_is_an_object_too() {
     );
 }
 
-/// An address of documentation (RFC 5737) is no machine's.
-#[test]
-fn an_unavailable_address_is_refused_with_the_remedy() {
-    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    let taken = listener.local_addr().unwrap().to_string();
-    for (address, remedy) in [
-        (
-            &*taken,
-            "another program has that port, perhaps another pendularm; --bind 127.0.0.1:0 takes a free one",
-        ),
-        (
-            "192.0.2.1:0",
-            "this machine does not have that address; use --bind 127.0.0.1:9095",
-        ),
-    ] {
-        let arguments = [
-            "--log",
-            "off",
-            "--token",
-            "long-enough-for-a-token",
-            "--bind",
-            address,
-        ];
-        let output = program(&arguments).output().unwrap();
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(1), "{said}");
-        let expected = format!("pendularm: cannot listen on {address}: {remedy}");
-        assert!(
-            said.starts_with(&expected) && said.lines().count() == 1,
-            "{said}"
-        );
-    }
-}
-
 /// Every write to `/dev/full` fails.
 #[cfg(target_os = "linux")]
 fn full() -> Stdio {
@@ -73,12 +39,16 @@ fn full() -> Stdio {
 #[cfg(target_os = "linux")]
 #[test]
 fn output_that_is_lost_is_a_failure() {
+    let runtime = common::Runtime::start();
+    let address = runtime.address.to_string();
     for arguments in [
         &["--help"][..],
         &["--version"],
         &["plan", "--error", "0.1", "--duration", "0.1"],
         #[cfg(feature = "cli")]
         &["completions", "bash"],
+        #[cfg(feature = "cli")]
+        &["topic", "list", "--connect", &address],
     ] {
         let output = program(arguments).stdout(full()).output().unwrap();
         let said = String::from_utf8(output.stderr).unwrap();

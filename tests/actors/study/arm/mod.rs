@@ -1,7 +1,6 @@
 //! The arm's requests to the study, in virtual time, with a substitute for the study.
 
 mod limits;
-mod warnings;
 
 use std::ops::Deref;
 
@@ -11,32 +10,11 @@ use crate::stage::{Client, Stage, asked};
 use pendularm::actors::arm::sim::ArmSim;
 use pendularm::actors::node::{Ask, Call};
 
-/// A substitute for the study: records its requests, and always gives the same answer.
-#[derive(Clone)]
+/// The requests to a substitute for the study, and the limit that it answers.
+#[derive(Clone, Default)]
 struct Oracle {
     asked: Rc<RefCell<Vec<ControlLoop<2>>>>,
     limit: Rc<Cell<f64>>,
-    period_limit: Rc<Cell<f64>>,
-}
-
-impl Actor for Oracle {
-    type Context = Context<Self>;
-}
-
-impl Handler<HeldLimit<2>> for Oracle {
-    type Result = Option<ClockLimits>;
-
-    fn handle(
-        &mut self,
-        HeldLimit(control): HeldLimit<2>,
-        _: &mut Context<Self>,
-    ) -> Option<ClockLimits> {
-        self.asked.borrow_mut().push(control);
-        Some(ClockLimits {
-            period: Some(self.period_limit.get()),
-            timestep: Some(self.limit.get()),
-        })
-    }
 }
 
 /// An arm with a substitute for the study, and a client that receives the arm's messages.
@@ -56,13 +34,17 @@ impl Deref for Consulting {
 
 impl Consulting {
     async fn new(limit: f64) -> Self {
-        let oracle = Oracle {
-            asked: Rc::default(),
-            period_limit: Rc::new(Cell::new(f64::INFINITY)),
-            limit: Rc::new(Cell::new(limit)),
-        };
+        let oracle = Oracle::default();
+        oracle.limit.set(limit);
         let stage = Stage::start().await;
-        let study = oracle.clone().start().recipient();
+        let Oracle { asked, limit } = oracle.clone();
+        let study = stand_in(move |HeldLimit(control): HeldLimit<2>| {
+            asked.borrow_mut().push(control);
+            Some(ClockLimits {
+                period: Some(f64::INFINITY),
+                timestep: Some(limit.get()),
+            })
+        });
         stage.arm.send(SetLimitPredictor(study)).await.unwrap();
         Self {
             client: stage.connect(),
