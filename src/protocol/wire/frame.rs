@@ -85,12 +85,7 @@ impl FrameReader {
     /// Adds bytes from the stream. Take all frames before the next push, so that memory stays bounded.
     pub fn push(&mut self, bytes: &[u8]) {
         self.compact();
-        // Without this a `Vec` would grow to twice [`MEDIUM`] before those bytes arrive.
-        let needed = self.buffer.len() + bytes.len();
-        if needed > self.buffer.capacity() && needed <= MEDIUM && needed > MEDIUM / 2 {
-            self.buffer.reserve_exact(MEDIUM - self.buffer.len());
-        }
-        self.buffer.extend_from_slice(bytes);
+        append(&mut self.buffer, bytes);
     }
 
     /// The series of messages at the present position, if there is one, limited in length. Call this before the next
@@ -322,6 +317,16 @@ impl Iterator for FrameReader {
     }
 }
 
+/// Appends received bytes. Without a permit, the buffer stays within [`MEDIUM`]: by itself a `Vec` would grow to twice
+/// as much before those bytes arrive.
+pub(super) fn append(buffer: &mut Vec<u8>, bytes: &[u8]) {
+    let needed = buffer.len() + bytes.len();
+    if needed > buffer.capacity() && needed <= MEDIUM && needed > MEDIUM / 2 {
+        buffer.reserve_exact(MEDIUM - buffer.len());
+    }
+    buffer.extend_from_slice(bytes);
+}
+
 fn not_an_object(line: &[u8]) -> FrameError {
     let prefix = line.get(..MAX_PREFIX).unwrap_or(line);
     let text = String::from_utf8_lossy(prefix.trim_ascii_end());
@@ -383,9 +388,6 @@ pub enum FrameError {
         /// Index of the first bad byte within the frame.
         at: usize,
     },
-    /// Text of a WebSocket that is not UTF-8.
-    #[error("malformed frame: the text of a WebSocket must be UTF-8")]
-    NotText,
 }
 
 /// The next part of a stream.
