@@ -28,7 +28,7 @@ use crate::actors::gateway::limits::{
     CLOSED_CHECK, DISCARD_BYTES, DISCARD_TIME, FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, READ_BYTES,
     RESPONSES_TIME,
 };
-use crate::actors::gateway::messages::{Disconnect, Request, Respond, Retire, form_of};
+use crate::actors::gateway::messages::{Disconnect, FrameKind, Request, Respond, Retire, form_of};
 use crate::actors::gateway::registry::Registry;
 use crate::actors::panics::contain;
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
@@ -590,13 +590,13 @@ impl Performer {
             Err(OpError::Call { service, problem }) => {
                 let why = problem.to_string();
                 let form = form_of(&self.wants_text);
-                self.say(messages::failure(&service, id.as_ref(), &why, form), None)
-                    .await
+                let failure = messages::failure(&service, id.as_ref(), &why, form);
+                self.say(failure, FrameKind::End).await
             }
             Err(OpError::Goal { action, problem }) => {
                 let (id, why, status) = (id.as_ref(), problem.to_string(), GoalStatus::Unknown);
                 let result = messages::action_result(&action, id, &why, status as u8, false);
-                self.say(result, None).await
+                self.say(result, FrameKind::End).await
             }
             Err(OpError::Status(why)) => self.send_error(&why.to_string(), id.as_ref()).await,
         }
@@ -638,19 +638,18 @@ impl Performer {
     /// Sends the client an error status.
     async fn send_error(&self, why: &str, id: Option<&Payload>) -> OpOutcome {
         tracing::debug!(connection = self.id.0, why, "refused");
-        self.say(messages::status(Level::Error, why, id), Some(Level::Error))
-            .await
+        let status = messages::status(Level::Error, why, id);
+        self.say(status, FrameKind::Status(Level::Error)).await
     }
 
     /// Sends a frame to the client through the registry. Its mailbox may still have a response to an earlier frame,
     /// which must arrive first.
-    async fn say(&self, frame: Bytes, status: Option<Level>) -> OpOutcome {
+    async fn say(&self, frame: Bytes, kind: FrameKind) -> OpOutcome {
         let frame = cover(self.permit.as_ref(), frame);
         let respond = Respond {
             connection: self.id,
             frame: Box::new(move || frame),
-            service: None,
-            status,
+            kind,
             done: None,
         };
         let _ = self.registry.send(respond).await;

@@ -7,40 +7,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::actors::ConnectionId;
+use crate::protocol::op::Served;
 use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTED};
-
-/// The kinds of names that a client can serve.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Served {
-    Service,
-    Action,
-}
-
-impl Served {
-    /// The word for it.
-    pub(crate) const fn noun(self) -> &'static str {
-        match self {
-            Self::Service => "service",
-            Self::Action => "action",
-        }
-    }
-
-    /// The verb for its provider.
-    pub(crate) const fn verb(self) -> &'static str {
-        match self {
-            Self::Service => "provide",
-            Self::Action => "serve",
-        }
-    }
-
-    /// The word for a request to its provider.
-    pub(crate) const fn request(self) -> &'static str {
-        match self {
-            Self::Service => "call",
-            Self::Action => "goal",
-        }
-    }
-}
 
 /// The services and actions by their absolute names, each with its provider.
 #[derive(Default)]

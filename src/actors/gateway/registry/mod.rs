@@ -27,7 +27,7 @@ use bytes::Bytes;
 use tokio::sync::oneshot;
 use tokio::time::{Instant, sleep_until};
 
-use self::directory::{Directory, Served};
+use self::directory::Directory;
 use self::forwarded::Requests;
 use self::kept::{Kept, KeptEntry};
 use self::places::Places;
@@ -38,14 +38,14 @@ use super::messages::{
     Retire, SetTap, TakeCensus, Tap, Tapped, ToClient,
 };
 use crate::actors::ConnectionId;
-use crate::actors::node::{Barrier, Interest, Respond};
+use crate::actors::node::{Barrier, FrameKind, Interest, Respond};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::{Permit, cover};
 pub use crate::actors::wire::Nodes;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, ErrorForm, Level};
 use crate::protocol::names;
-use crate::protocol::op::{ActionServerOp, Op, Verbosity};
+use crate::protocol::op::{Op, ProviderOp, Served, Verbosity};
 use crate::protocol::wire::json::Payload;
 
 /// Calls and goals ended per cleanup, which takes a third of a millisecond.
@@ -315,20 +315,24 @@ impl Handler<Respond> for Registry {
     type Result = ();
 
     fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
-        if let Some(client) = self.clients.get(&respond.connection)
-            && respond
-                .status
-                .is_none_or(|level| client.verbosity.wants(level))
-        {
-            let frame = (respond.frame)();
-            if let (Some(tap), Some(service)) = (&mut self.tap, respond.service) {
-                tap(Tapped::Answered {
-                    to: respond.connection,
-                    service,
-                    frame: &frame,
-                });
+        let Some(client) = self.clients.get(&respond.connection) else {
+            return;
+        };
+        match respond.kind {
+            FrameKind::Status(level) if !client.verbosity.wants(level) => {}
+            FrameKind::Status(_) | FrameKind::End => client.send((respond.frame)()),
+            FrameKind::Feedback => client.deliver_feedback((respond.frame)()),
+            FrameKind::Answer(service) => {
+                let frame = (respond.frame)();
+                if let Some(tap) = &mut self.tap {
+                    tap(Tapped::Answered {
+                        to: respond.connection,
+                        service,
+                        frame: &frame,
+                    });
+                }
+                client.respond(frame, Some(service));
             }
-            client.respond(frame, respond.service);
         }
     }
 }
@@ -427,7 +431,15 @@ impl Registry {
                 }
                 Ok(())
             }
-            op => self.perform_as_provider(&origin, op),
+            Op::Serve { kind, name, op } => self.perform_as_provider(&origin, kind, &name, op),
+            Op::BadAnswer {
+                kind,
+                name,
+                problem,
+            } => self.fail_answered(&origin, kind, name.as_deref(), problem),
+            // The connection has already joined the pieces and checked the token. If no token is required, any token is
+            // accepted.
+            Op::Fragment(_) | Op::Auth { .. } => Ok(()),
         };
         if let Err(why) = refusal {
             self.refuse(&origin, &why);
@@ -435,55 +447,37 @@ impl Registry {
         Handled::at_once()
     }
 
-    /// Performs an op of a provider: it advertises a service or an action, or answers a request.
-    fn perform_as_provider(&mut self, origin: &FrameOrigin, op: Op) -> Result<(), Refusal> {
+    /// Performs an op of a client that serves `name`.
+    fn perform_as_provider(
+        &mut self,
+        origin: &FrameOrigin,
+        kind: Served,
+        name: &str,
+        op: ProviderOp,
+    ) -> Result<(), Refusal> {
         match op {
-            Op::AdvertiseService { service, type_name } => {
-                self.serve(origin, Served::Service, &service, type_name.as_deref())
+            ProviderOp::Advertise { type_name } => {
+                self.serve(origin, kind, name, type_name.as_deref())
             }
-            Op::UnadvertiseService { service } => {
-                self.stop_serving(origin, Served::Service, &service)
-            }
-            Op::ServeAction { action, op } => match op {
-                ActionServerOp::Advertise { type_name } => {
-                    self.serve(origin, Served::Action, &action, type_name.as_deref())
-                }
-                ActionServerOp::Unadvertise => self.stop_serving(origin, Served::Action, &action),
-                ActionServerOp::Feedback { values } => self.pass_feedback(origin, &action, &values),
-                ActionServerOp::End {
-                    values,
-                    status,
-                    result,
-                } => self.complete(origin, Served::Action, &action, |name, id| {
-                    messages::action_result(name, id, &values, status, result)
-                }),
-            },
-            Op::ServiceResponse {
-                service,
+            ProviderOp::Unadvertise => self.stop_serving(origin, kind, name),
+            ProviderOp::Feedback { values } => self.pass_feedback(origin, name, &values),
+            ProviderOp::End {
+                values,
+                status,
+                result,
+            } => self.complete(origin, kind, name, |name, id| {
+                messages::action_result(name, id, &values, status, result)
+            }),
+            ProviderOp::Respond {
                 values,
                 result,
                 status,
             } => {
                 let status = status.unwrap_or_default();
-                self.complete(origin, Served::Service, &service, |service, id| {
-                    messages::response(service, id, &values, result, &status)
+                self.complete(origin, kind, name, |name, id| {
+                    messages::response(name, id, &values, result, &status)
                 })
             }
-            Op::BadAnswer {
-                of_goal,
-                name,
-                problem,
-            } => {
-                let kind = if of_goal {
-                    Served::Action
-                } else {
-                    Served::Service
-                };
-                self.fail_answered(origin, kind, name.as_deref(), problem)
-            }
-            // The connection has already joined the pieces and checked the token. If no token is required, any token is
-            // accepted.
-            _ => Ok(()),
         }
     }
 

@@ -8,22 +8,21 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::directory::Served;
 use super::forwarded::{Forwarded, RequestTerms};
 use super::refusal::Refusal;
 use super::{FrameOrigin, Registry};
 use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
 use crate::actors::gateway::messages::{Handled, Tapped};
-use crate::actors::node::{Feedback, guard};
+use crate::actors::node::guard;
 use crate::actors::resources::memory::cover_message;
 use crate::actors::wire::action_client::{
-    ActionClient, ActionRequest, CancelSent, Canceller, ForwardGoal, SentGoal,
+    ActionClient, ActionRequest, CancelSent, ForwardGoal, SentGoal,
 };
 use crate::actors::wire::{Caller, Route, ServiceCall};
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
-use crate::protocol::op::{ActionGoal, Arguments, CallService, GoalStatus, Problem};
+use crate::protocol::op::{ActionGoal, Arguments, CallService, GoalStatus, Problem, Served};
 use crate::protocol::wire::json::Payload;
 use crate::services::{Address, NoService};
 
@@ -129,7 +128,6 @@ impl Registry {
         };
         let action_client = ActionClient {
             respond: ctx.address().recipient(),
-            feedback: ctx.address().recipient(),
             connection: origin.from,
             action: Arc::from(goal.action.as_str()),
             id: origin.id,
@@ -179,25 +177,15 @@ impl Registry {
             return Handled::at_once();
         };
         let (done, ended) = guard();
-        let from = Canceller {
-            respond: ctx.address().recipient(),
+        node(ActionRequest::Cancel(CancelSent {
             goal: SentGoal {
                 connection: origin.from,
                 id: origin.id,
             },
-        };
-        node(ActionRequest::Cancel(CancelSent { from, done }));
+            respond: ctx.address().recipient(),
+            done,
+        }));
         Handled::with(ended)
-    }
-}
-
-impl Handler<Feedback> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, feedback: Feedback, _: &mut Context<Self>) {
-        if let Some(client) = self.clients.get(&feedback.connection) {
-            client.deliver_feedback((feedback.frame)());
-        }
     }
 }
 
