@@ -113,8 +113,7 @@ struct Registrations {
     advertised: BTreeMap<Box<str>, KeptEntry>,
     /// Topics of its subscriptions, in its own spelling.
     subscribed: BTreeSet<Arc<str>>,
-    services: BTreeMap<Box<str>, KeptEntry>,
-    actions: BTreeMap<Box<str>, KeptEntry>,
+    served: BTreeMap<(Served, Box<str>), KeptEntry>,
 }
 
 /// The sender of the frame that is being performed, and the frame's `id`.
@@ -187,15 +186,6 @@ impl Client {
     /// Bytes of responses that wait to be written to it.
     fn backlog(&self) -> usize {
         self.outlets.backlog.load(Ordering::Relaxed)
-    }
-}
-
-impl Registrations {
-    fn served(&mut self, kind: Served) -> &mut BTreeMap<Box<str>, KeptEntry> {
-        match kind {
-            Served::Service => &mut self.services,
-            Served::Action => &mut self.actions,
-        }
     }
 }
 
@@ -545,11 +535,8 @@ impl Registry {
         for topic in &registered.subscribed {
             self.drop_subscriber(topic, id);
         }
-        for service in registered.services.keys() {
-            self.directory.withdraw(Served::Service, service, id);
-        }
-        for action in registered.actions.keys() {
-            self.directory.withdraw(Served::Action, action, id);
+        for (kind, name) in registered.served.keys() {
+            self.directory.withdraw(*kind, name, id);
         }
         if self.requests.waiting_for(id).is_some() {
             self.gone.push_back(id);

@@ -212,15 +212,15 @@ impl Registry {
             return Ok(());
         };
         let bytes = spelling.len() + type_name.map_or(0, str::len);
-        let served = client.registered.served(kind);
-        let entry = client.kept.enter(bytes, served.get(name))?;
-        served.insert(name.into(), entry);
+        let (key, served) = ((kind, name.into()), &mut client.registered.served);
+        let entry = client.kept.enter(bytes, served.get(&key))?;
+        served.insert(key, entry);
         let provider = (origin.from, spelling);
         let before = self.directory.provide(kind, name, provider, type_name);
         if let Some(before) = before.filter(|one| *one != origin.from)
             && let Some(before) = self.clients.get_mut(&before)
         {
-            before.registered.served(kind).remove(name);
+            before.registered.served.remove(&(kind, name.into()));
         }
         let msg = format!("advertised {} {spelling}", kind.noun());
         self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
@@ -239,7 +239,7 @@ impl Registry {
             return Err(Refusal::NotServed(kind, spelling.to_owned()));
         }
         if let Some(client) = self.clients.get_mut(&origin.from) {
-            client.registered.served(kind).remove(name);
+            client.registered.served.remove(&(kind, name.into()));
         }
         Ok(())
     }
