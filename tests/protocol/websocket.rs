@@ -14,7 +14,7 @@ fn read<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> Vec<String> {
         reader.push(piece);
         while let Some(part) = reader.cut() {
             outcomes.push(match part {
-                FramePart::Message(message) => String::from_utf8_lossy(&message).into_owned(),
+                FramePart::Frame(message) => message.decode().unwrap().unwrap().text,
                 FramePart::Error(error, start) => format!("{error}: {} bytes", start.len()),
                 other => panic!("{other:?}"),
             });
@@ -28,25 +28,25 @@ fn read<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> Vec<String> {
 #[test]
 fn a_stream_is_read_alike_in_any_pieces() {
     let mask = [1, 2, 3, 4];
+    let long = format!("{{\"{}\":1}}", "\u{e9}".repeat(200));
     let mut stream = Vec::new();
-    append(&mut stream, LAST | opcode::TEXT, mask, b"whole");
-    append(&mut stream, opcode::BINARY, mask, b"one ");
+    append(&mut stream, LAST | opcode::TEXT, mask, b"{\"whole\":1}");
+    append(&mut stream, opcode::BINARY, mask, b"{\"one\":");
     append(&mut stream, opcode::CONTINUATION, mask, b"");
     append(&mut stream, LAST | opcode::PONG, mask, b"pong");
-    append(&mut stream, LAST | opcode::CONTINUATION, mask, b"message");
     append(
         &mut stream,
-        LAST | opcode::TEXT,
+        LAST | opcode::CONTINUATION,
         mask,
-        "\u{e9}".repeat(200).as_bytes(),
+        b"\"message\"}",
     );
+    append(&mut stream, LAST | opcode::TEXT, mask, long.as_bytes());
     append(&mut stream, LAST | opcode::PING, mask, b"ping");
     append_close(&mut stream, mask, 3000, "why");
     append(&mut stream, LAST | opcode::TEXT, mask, b"after the end");
-    let long = "\u{e9}".repeat(200);
     let wanted = [
-        "whole",
-        "one message",
+        "{\"whole\":1}",
+        "{\"one\":\"message\"}",
         &long,
         "ping b\"ping\"",
         "Closed(Some(3000))",
@@ -69,8 +69,8 @@ fn a_message_that_is_too_long_is_skipped_to_its_end() {
             append(&mut stream, opcode::CONTINUATION, [7; 4], &vec![b'y'; part]);
         }
         append(&mut stream, LAST | opcode::CONTINUATION, [7; 4], b"");
-        append(&mut stream, LAST | opcode::TEXT, [7; 4], b"next");
-        assert_eq!(read(stream.chunks(1 << 15)), [&too_long, "next"], "{part}");
+        append(&mut stream, LAST | opcode::TEXT, [7; 4], b"{}");
+        assert_eq!(read(stream.chunks(1 << 15)), [&too_long, "{}"], "{part}");
     }
 }
 
@@ -78,7 +78,8 @@ fn a_message_that_is_too_long_is_skipped_to_its_end() {
 fn messages_read_ahead_come_in_order() {
     let mut stream = Vec::new();
     for number in 0..4 {
-        append(&mut stream, LAST | opcode::TEXT, [0; 4], &[b'0' + number]);
+        let message = format!("{{\"n\":{number}}}");
+        append(&mut stream, LAST | opcode::TEXT, [0; 4], message.as_bytes());
     }
     append(&mut stream, LAST | opcode::PING, [0; 4], b"");
     let mut reader = MessageReader::default();
@@ -86,10 +87,16 @@ fn messages_read_ahead_come_in_order() {
     reader.look_ahead(2);
     assert_eq!(reader.take_ping(), None);
     reader.look_ahead(8);
-    assert_eq!((reader.waiting(), reader.take_ping()), (4, Some("".into())));
+    assert_eq!(
+        (reader.waiting(), reader.take_ping()),
+        (28, Some("".into()))
+    );
     for number in 0..4 {
-        let part = reader.cut();
-        assert!(matches!(part, Some(FramePart::Message(one)) if one[..] == [b'0' + number]));
+        let Some(FramePart::Frame(message)) = reader.cut() else {
+            panic!("message {number} is missing");
+        };
+        let message = message.decode().unwrap().unwrap();
+        assert_eq!(message.text, format!("{{\"n\":{number}}}"));
     }
     assert!(reader.cut().is_none() && reader.end().is_none());
 }

@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 
 use bytes::{Buf, BufMut, Bytes, BytesMut};
 
-use super::frame::{FrameError, FramePart, append, start_of};
+use super::frame::{FrameError, FramePart, RawFrame, append, start_of};
 use crate::protocol::limits::MAX_FRAME;
 
 /// The kinds of frames.
@@ -119,7 +119,7 @@ impl MessageReader {
     #[must_use]
     pub fn waiting(&self) -> usize {
         let ahead = self.ahead.iter().map(|part| match part {
-            FramePart::Message(message) => message.len(),
+            FramePart::Frame(message) => message.len(),
             _ => 0,
         });
         self.input.len() + self.message.len() + ahead.sum::<usize>()
@@ -154,7 +154,7 @@ impl MessageReader {
                 self.is_open = false;
                 let message = std::mem::take(&mut self.message);
                 if !std::mem::take(&mut self.is_skipped) {
-                    return Some(FramePart::Message(message.into()));
+                    return Some(FramePart::Frame(RawFrame::of_message(message)));
                 }
             }
             if error.is_some() || !is_complete {

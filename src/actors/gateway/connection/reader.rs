@@ -361,7 +361,7 @@ impl ClientReader {
         match &cut {
             FramePart::Lines(_) => connection.outgoing.set_singly(false),
             FramePart::Frame(frame) => connection.outgoing.set_singly(!frame.newline()),
-            FramePart::Message(_) | FramePart::Error(..) => {}
+            FramePart::Error(..) => {}
         }
         self.performing = Some(Box::pin(performer.take(cut)));
         Ok(true)
@@ -530,16 +530,7 @@ impl Performer {
 
     async fn perform_part(&mut self, cut: FramePart) -> OpOutcome {
         match cut {
-            FramePart::Frame(frame) => {
-                let length = frame.len();
-                self.perform_frame(length, move || Some(read(Ok(frame))))
-                    .await
-            }
-            FramePart::Message(message) => {
-                let length = message.len();
-                self.perform_frame(length, move || read_message(&message))
-                    .await
-            }
+            FramePart::Frame(frame) => self.perform_frame(frame).await,
             FramePart::Lines(lines) => {
                 self.speaks_json = true;
                 self.perform(None, Op::PublishLines(lines), 0).await
@@ -553,17 +544,14 @@ impl Performer {
         }
     }
 
-    /// Reads a frame of `length` bytes and performs it.
-    async fn perform_frame(
-        &mut self,
-        length: usize,
-        read: impl FnOnce() -> Option<Incoming> + Send + 'static,
-    ) -> OpOutcome {
+    /// Reads a frame and performs it.
+    async fn perform_frame(&mut self, frame: RawFrame) -> OpOutcome {
+        let length = frame.len();
         self.speaks_json = true;
         if length > MEDIUM {
             self.take_room().await;
         }
-        let incoming = match read_frame(length, read).await {
+        let incoming = match read_frame(length, move || read(frame)).await {
             Ok(incoming) => incoming,
             Err(outcome) => return outcome,
         };
@@ -623,7 +611,8 @@ impl Performer {
             }
         };
         let length = whole.bytes();
-        let whole = read_frame(length, move || read_message(whole.text().as_bytes())).await?;
+        let join = move || RawFrame::of_message(whole.text().into_bytes());
+        let whole = read_frame(length, move || read(join())).await?;
         let whole = match whole.op {
             Ok(Op::Fragment(_)) => Incoming {
                 id,
@@ -703,15 +692,10 @@ fn under_id(incoming: Incoming, id: Option<Payload>) -> Incoming {
     }
 }
 
-/// Parses a complete frame, or returns its error.
-fn read(frame: Result<RawFrame, (FrameError, Vec<u8>)>) -> Incoming {
-    match frame.and_then(RawFrame::decode) {
+/// Parses a complete frame, or returns its error. `None` for a message that has only white space.
+fn read(frame: RawFrame) -> Option<Incoming> {
+    Some(match frame.decode()? {
         Ok(frame) => op::read(&frame.text),
         Err((error, start)) => op::read_start(&start, &error),
-    }
-}
-
-/// Parses a message of a WebSocket, or a frame that was joined from pieces. `None` if it has only white space.
-fn read_message(message: &[u8]) -> Option<Incoming> {
-    RawFrame::of_message(message).map(read)
+    })
 }
