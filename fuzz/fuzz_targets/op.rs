@@ -17,7 +17,7 @@ use pendularm::protocol::limits::MAX_NAME;
 use pendularm::protocol::messages::{self, ErrorForm, Level};
 use pendularm::protocol::op::trajectory::joint_trajectory;
 use pendularm::protocol::op::{
-    self, ActionServerOp, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem,
+    self, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem, ProviderOp,
 };
 use pendularm::protocol::wire::frame::FrameReader;
 use pendularm::protocol::wire::json::Payload;
@@ -118,18 +118,6 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
                 check_passed_on(json.get("args"), line.get("args"));
             }
         }
-        Op::ServiceResponse {
-            service,
-            values,
-            result,
-            status,
-        } => {
-            check_name(json, "service", service);
-            let status = status.as_deref().unwrap_or_default();
-            let line = check_line(&messages::response(service, id, values, *result, status));
-            check_passed_on(json.get("values"), line.get("values"));
-            check_passed_on(json.get("id"), line.get("id"));
-        }
         Op::Subscribe(one) => {
             check_name(json, "topic", &one.topic);
             let number = |name: &str| json.get(name).and_then(Json::number);
@@ -149,26 +137,33 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
         Op::Advertise { topic, .. } | Op::Unadvertise { topic } | Op::Unsubscribe { topic } => {
             check_name(json, "topic", topic)
         }
-        Op::AdvertiseService { service, .. } | Op::UnadvertiseService { service } => {
-            check_name(json, "service", service)
-        }
         Op::SendActionGoal(goal) => check_name(json, "action", &goal.action),
         Op::CancelActionGoal { action } => check_name(json, "action", action),
-        Op::ServeAction { action, op } => {
-            check_name(json, "action", action);
+        Op::Serve { kind, name, op } => {
+            check_name(json, kind.noun(), name);
             match op {
-                ActionServerOp::Advertise { .. } | ActionServerOp::Unadvertise => {}
-                ActionServerOp::Feedback { values } => {
-                    let line = check_line(&messages::action_feedback(action, id, values));
+                ProviderOp::Advertise { .. } | ProviderOp::Unadvertise => {}
+                ProviderOp::Respond {
+                    values,
+                    result,
+                    status,
+                } => {
+                    let status = status.as_deref().unwrap_or_default();
+                    let line = check_line(&messages::response(name, id, values, *result, status));
+                    check_passed_on(json.get("values"), line.get("values"));
+                    check_passed_on(json.get("id"), line.get("id"));
+                }
+                ProviderOp::Feedback { values } => {
+                    let line = check_line(&messages::action_feedback(name, id, values));
                     check_passed_on(json.get("values"), line.get("values"));
                 }
-                ActionServerOp::End {
+                ProviderOp::End {
                     values,
                     status,
                     result,
                 } => {
                     assert!(*status <= 6, "a status of a goal");
-                    let line = messages::action_result(action, id, values, *status, *result);
+                    let line = messages::action_result(name, id, values, *status, *result);
                     check_line(&line);
                 }
             }

@@ -244,7 +244,7 @@ impl Publish {
     }
 }
 
-/// A frame for one client: an answer or a status. From a node.
+/// A frame for one client. From a node, or from the client's own connection.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Respond {
@@ -252,12 +252,23 @@ pub struct Respond {
     pub connection: ConnectionId,
     /// The whole frame.
     pub frame: FrameOut,
-    /// The answered service, if it is the runtime's own.
-    pub service: Option<Service>,
-    /// The level, if it is a status. It is sent only to clients that selected this level.
-    pub status: Option<Level>,
+    /// Its kind.
+    pub kind: FrameKind,
     /// Dropped once the frame is sent, if that is also the end of the call.
     pub done: Option<Done>,
+}
+
+/// The kinds of frames for one client.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameKind {
+    /// The answer of one of the runtime's services.
+    Answer(Service),
+    /// The end of a goal, or the refusal of a call or goal that could not be read.
+    End,
+    /// A status. It is sent only to clients that selected this level.
+    Status(Level),
+    /// Feedback of a goal. It may be dropped for a slow client.
+    Feedback,
 }
 
 impl Respond {
@@ -275,8 +286,7 @@ impl Respond {
         Self {
             connection,
             frame: Box::new(write),
-            service: None,
-            status: Some(level),
+            kind: FrameKind::Status(level),
             done: None,
         }
     }
@@ -287,13 +297,3 @@ impl Respond {
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct Barrier;
-
-/// Feedback of a goal for the client that sent it. It may be dropped for a slow client. From the node of the goal.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct Feedback {
-    /// The client.
-    pub connection: ConnectionId,
-    /// The whole frame.
-    pub frame: FrameOut,
-}

@@ -5,8 +5,8 @@
 use bytes::Bytes;
 use hyper::header::{SEC_WEBSOCKET_VERSION, UPGRADE};
 use hyper::{Request, StatusCode};
-use tokio_tungstenite::tungstenite::error::{Error, ProtocolError};
-use tokio_tungstenite::tungstenite::handshake::server::create_response;
+use tungstenite::error::{Error, ProtocolError};
+use tungstenite::handshake::server::create_response;
 
 use super::head::RequestHead;
 use super::response::{HttpResponse, set, text};

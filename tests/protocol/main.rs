@@ -14,3 +14,4 @@ mod scene;
 mod series;
 mod trajectory;
 mod tree;
+mod websocket;

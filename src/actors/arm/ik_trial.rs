@@ -81,18 +81,6 @@ impl<const N: usize> IkTrial<N> {
     }
 }
 
-// ---- messages -------------------------------------------------------------------------------------------------------
-
-/// The arm's answer and the purpose of the request. From this node to itself, so it is queued after all earlier news
-/// of the arm.
-#[derive(Message)]
-#[rtype(result = "()")]
-struct PoseKnown<const N: usize> {
-    /// `None` if the arm has ended.
-    pose: Option<Pose<N>>,
-    intent: Intent,
-}
-
 /// The node's next action, once it has lengths and time.
 enum Intent {
     /// Performs a request.
@@ -121,57 +109,6 @@ impl<const N: usize> Handler<Call<TrialRequest>> for IkTrial<N> {
                 reply.answer(self.terms(Err(TrialRefused::Rejected(rejected))));
             }
             ask => self.ask_arm(Intent::Perform(ask, reply), ctx),
-        }
-    }
-}
-
-impl<const N: usize> Handler<PoseKnown<N>> for IkTrial<N> {
-    type Result = ();
-
-    fn handle(&mut self, known: PoseKnown<N>, ctx: &mut Context<Self>) {
-        let Some(pose) = known.pose else {
-            // Without an arm there is nothing to do.
-            if let Intent::Perform(_, mut reply) = known.intent {
-                reply.refuse(Unserved::NoAnswer(Node::ArmSim.name()));
-            }
-            return;
-        };
-        let mut commands = self.hear(&pose);
-        let target = || sample(&self.lengths, || self.rng.f64());
-        let (decided, reply) = match known.intent {
-            Intent::Perform(ask, reply) => {
-                let moves_arm = ask != TrialRequest::Stop;
-                let decided = match ask {
-                    TrialRequest::Start { changes, .. } => {
-                        let decided = self.trial.start(self.clock.1, changes, target);
-                        if decided.is_ok() {
-                            self.cancel_deadline(ctx);
-                        }
-                        decided
-                    }
-                    TrialRequest::Skip => self.trial.skip(target),
-                    TrialRequest::Stop => self.trial.stop(),
-                };
-                if let (true, true, Some(obstacle)) = (decided.is_ok(), moves_arm, pose.obstacle) {
-                    reply.warn(&obstacle.to_string());
-                }
-                (decided, Some(reply))
-            }
-            Intent::CheckDeadline => (Ok(Vec::new()), None),
-            Intent::ShowStatus => {
-                self.status_asked = false;
-                (Ok(vec![TrialCommand::PublishStatus]), None)
-            }
-        };
-        match decided {
-            Ok(more) => {
-                commands.extend(more);
-                self.perform(commands, reply, ctx);
-            }
-            Err(why) => {
-                self.perform(commands, None, ctx);
-                self.answer(reply, Err(why.into()));
-            }
         }
     }
 }
@@ -211,15 +148,65 @@ impl<const N: usize> Handler<Interest> for IkTrial<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> IkTrial<N> {
-    /// Sends a request to the arm, and continues after all its earlier messages have been handled.
+    /// Sends a request to the arm, and continues after all its earlier news. They are in this node's mailbox before the
+    /// barrier is answered, and an actor empties its mailbox before it continues a future.
     fn ask_arm(&self, intent: Intent, ctx: &mut Context<Self>) {
-        let (arm, barrier, own) = (self.arm.clone(), self.goals.barrier.clone(), ctx.address());
+        let (arm, barrier) = (self.arm.clone(), self.goals.barrier.clone());
         let question = async move {
             let pose = arm.send(ArmPose).await.ok();
             let _ = barrier.send(Barrier).await;
-            own.do_send(PoseKnown { pose, intent });
+            pose
         };
-        ctx.spawn(question.into_actor(self));
+        let asked = question.into_actor(self);
+        ctx.spawn(asked.map(move |pose, node, ctx| node.act(pose, intent, ctx)));
+    }
+
+    /// Does the next action at this pose of the arm; `None` if the arm has ended.
+    fn act(&mut self, pose: Option<Pose<N>>, intent: Intent, ctx: &mut Context<Self>) {
+        let Some(pose) = pose else {
+            // Without an arm there is nothing to do.
+            if let Intent::Perform(_, mut reply) = intent {
+                reply.refuse(Unserved::NoAnswer(Node::ArmSim.name()));
+            }
+            return;
+        };
+        let mut commands = self.hear(&pose);
+        let target = || sample(&self.lengths, || self.rng.f64());
+        let (decided, reply) = match intent {
+            Intent::Perform(ask, reply) => {
+                let moves_arm = ask != TrialRequest::Stop;
+                let decided = match ask {
+                    TrialRequest::Start { changes, .. } => {
+                        let decided = self.trial.start(self.clock.1, changes, target);
+                        if decided.is_ok() {
+                            self.cancel_deadline(ctx);
+                        }
+                        decided
+                    }
+                    TrialRequest::Skip => self.trial.skip(target),
+                    TrialRequest::Stop => self.trial.stop(),
+                };
+                if let (true, true, Some(obstacle)) = (decided.is_ok(), moves_arm, pose.obstacle) {
+                    reply.warn(&obstacle.to_string());
+                }
+                (decided, Some(reply))
+            }
+            Intent::CheckDeadline => (Ok(Vec::new()), None),
+            Intent::ShowStatus => {
+                self.status_asked = false;
+                (Ok(vec![TrialCommand::PublishStatus]), None)
+            }
+        };
+        match decided {
+            Ok(more) => {
+                commands.extend(more);
+                self.perform(commands, reply, ctx);
+            }
+            Err(why) => {
+                self.perform(commands, None, ctx);
+                self.answer(reply, Err(why.into()));
+            }
+        }
     }
 
     /// Stores lengths and time. Two requests may be answered in either order, so the later time counts.

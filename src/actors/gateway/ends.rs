@@ -4,9 +4,6 @@
 
 use std::net::{Ipv4Addr, SocketAddr};
 
-#[cfg(feature = "web")]
-use crate::protocol::wire::frame::FrameError;
-
 /// The two addresses of a client's connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ends {
@@ -32,14 +29,11 @@ impl From<SocketAddr> for Ends {
 }
 
 /// Why a client can no longer be read.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ClientLost {
     /// It has disconnected.
     Gone,
     /// It has violated a rule, and gets an error at the end.
     #[cfg(feature = "web")]
     Refused,
-    /// Its WebSocket ends with a message that is too long, or whose text is not UTF-8.
-    #[cfg(feature = "web")]
-    Unreadable(FrameError),
 }

@@ -13,7 +13,7 @@ use tokio::sync::oneshot;
 
 use crate::actors::ConnectionId;
 use crate::actors::node::Done;
-pub use crate::actors::node::{Feedback, Publish, Respond};
+pub use crate::actors::node::{FrameKind, Publish, Respond};
 use crate::actors::resources::memory::Permit;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::ErrorForm;

@@ -10,7 +10,7 @@ use actix::prelude::*;
 use serde::Serialize;
 
 use crate::actors::ConnectionId;
-use crate::actors::node::{Done, Feedback, Respond};
+use crate::actors::node::{Done, FrameKind, FrameOut, Respond};
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::fields::Rejections;
@@ -53,8 +53,10 @@ pub struct ForwardGoal<G> {
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct CancelSent {
-    /// The client that cancels. It gets an error status if no such goal is active.
-    pub from: Canceller,
+    /// The goal. Its client gets an error status if it is not active.
+    pub goal: SentGoal,
+    /// The way back.
+    pub respond: Recipient<Respond>,
     /// Dropped when the goal has ended.
     pub done: Done,
 }
@@ -68,20 +70,10 @@ pub struct SentGoal {
     pub id: Option<Payload>,
 }
 
-/// The client that cancels a goal.
-pub struct Canceller {
-    /// The way back.
-    pub respond: Recipient<Respond>,
-    /// The goal to cancel.
-    pub goal: SentGoal,
-}
-
 /// The client that sent a goal, and its recipients.
 pub struct ActionClient {
-    /// Recipient of results, which are never dropped.
+    /// The way back.
     pub respond: Recipient<Respond>,
-    /// Recipient of feedback, which may be dropped.
-    pub feedback: Recipient<Feedback>,
     /// The connection.
     pub connection: ConnectionId,
     /// The action's name as the client spells it.
@@ -94,7 +86,7 @@ pub struct ActionClient {
     pub gone: Arc<AtomicBool>,
 }
 
-impl Canceller {
+impl CancelSent {
     /// Sends the reason why no goal was cancelled.
     pub fn refuse(&self, why: &str) {
         let SentGoal { connection, id } = &self.goal;
@@ -128,10 +120,7 @@ impl ActionClient {
         if self.wants_feedback {
             let (action, id) = (Arc::clone(&self.action), self.id.clone());
             let write = move || messages::action_feedback(&action, id.as_ref(), &values);
-            self.feedback.do_send(Feedback {
-                connection: self.connection,
-                frame: Box::new(write),
-            });
+            self.send(FrameKind::Feedback, Box::new(write));
         }
     }
 
@@ -141,11 +130,14 @@ impl ActionClient {
         let (action, id) = (Arc::clone(&self.action), self.id.clone());
         let write =
             move || messages::action_result(&action, id.as_ref(), &values, status as u8, result);
+        self.send(FrameKind::End, Box::new(write));
+    }
+
+    fn send(&self, kind: FrameKind, frame: FrameOut) {
         self.respond.do_send(Respond {
             connection: self.connection,
-            frame: Box::new(write),
-            service: None,
-            status: None,
+            frame,
+            kind,
             done: None,
         });
     }

@@ -23,7 +23,9 @@ use tokio::sync::oneshot;
 
 use self::action_client::{ActionRequest, CancelSent, ForwardGoal, Goal};
 use crate::actors::ConnectionId;
-use crate::actors::node::{Asker, Call, Done, FrameOut, Interest, Reply, Respond, Unserved, guard};
+use crate::actors::node::{
+    Asker, Call, Done, FrameKind, FrameOut, Interest, Reply, Respond, Unserved, guard,
+};
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::actors::resources::memory::{Memory, NoRoom, Permit, SHORT, cover};
 use crate::protocol::catalog::{Action, Service, Topic};
@@ -271,8 +273,7 @@ impl Caller {
         self.registry.do_send(Respond {
             connection: self.connection,
             frame,
-            service: Some(service),
-            status: None,
+            kind: FrameKind::Answer(service),
             done,
         });
     }

@@ -72,18 +72,6 @@ pub enum Op {
         /// Topic name.
         topic: String,
     },
-    /// Makes the sender the provider of a service.
-    AdvertiseService {
-        /// Service name.
-        service: String,
-        /// Service type, if given.
-        type_name: Option<String>,
-    },
-    /// Ends this registration.
-    UnadvertiseService {
-        /// Service name.
-        service: String,
-    },
     /// Calls a service.
     CallService(CallService),
     /// A goal for an action.
@@ -93,12 +81,14 @@ pub enum Op {
         /// Action name.
         action: String,
     },
-    /// An operation of an action server: a client that executes the goals of an action.
-    ServeAction {
-        /// Action name.
-        action: String,
+    /// An operation of a client that serves a service or an action.
+    Serve {
+        /// Its kind.
+        kind: Served,
+        /// Name of the service or action.
+        name: String,
         /// The op.
-        op: ActionServerOp,
+        op: ProviderOp,
     },
     /// A piece of a longer frame.
     Fragment(Piece),
@@ -116,22 +106,11 @@ pub enum Op {
         /// Whether the sender is a command of this program, which may use a kept place.
         is_command: bool,
     },
-    /// A provider's answer to a forwarded call.
-    ServiceResponse {
-        /// Service name.
-        service: String,
-        /// Any value.
-        values: Payload,
-        /// Whether the call succeeded.
-        result: bool,
-        /// The provider's own `status`, if given.
-        status: Option<String>,
-    },
     /// An answer that cannot be forwarded. Its call or goal fails. Without an id, it is the only one that its
     /// sender has.
     BadAnswer {
-        /// Whether it is for a goal.
-        of_goal: bool,
+        /// What its sender serves.
+        kind: Served,
         /// The service or action, if the frame names one.
         name: Option<String>,
         /// The fault.
@@ -233,16 +212,45 @@ pub struct ActionGoal {
     pub feedback: bool,
 }
 
-/// An operation of an action server. If it concerns one goal, the frame's id identifies the goal.
+/// The kinds of names that a client can serve to others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Served {
+    /// Its calls are answered.
+    Service,
+    /// Its goals are executed.
+    Action,
+}
+
+impl Served {
+    /// The word for it, which is also the member with its name.
+    #[must_use]
+    pub const fn noun(self) -> &'static str {
+        match self {
+            Self::Service => "service",
+            Self::Action => "action",
+        }
+    }
+}
+
+/// An operation of a client that serves. If it concerns one call or goal, the frame's id identifies that.
 #[derive(Debug, Clone)]
-pub enum ActionServerOp {
-    /// The sender serves the action from now on.
+pub enum ProviderOp {
+    /// The sender serves the name from now on.
     Advertise {
-        /// Action type, if given.
+        /// Its type, if given.
         type_name: Option<String>,
     },
     /// Ends this registration.
     Unadvertise,
+    /// Answers a call.
+    Respond {
+        /// Any value.
+        values: Payload,
+        /// Whether the call succeeded.
+        result: bool,
+        /// The provider's own `status`, if given.
+        status: Option<String>,
+    },
     /// Forwards feedback of a goal.
     Feedback {
         /// Any value.

@@ -8,9 +8,9 @@ use std::time::Duration;
 use serde_json::value::RawValue;
 
 use super::{
-    ActionGoal, ActionServerOp, Arguments, CallService, Compression, Encoding, GoalStatus,
-    Incoming, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem, Subscribe,
-    Verbosity,
+    ActionGoal, Arguments, CallService, Compression, Encoding, GoalStatus, Incoming,
+    MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem, ProviderOp, Served,
+    Subscribe, Verbosity,
 };
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::{ErrorForm, Level};
@@ -141,13 +141,6 @@ impl<'a> OpReader<'a> {
             "unsubscribe" => Op::Unsubscribe {
                 topic: self.name("topic")?,
             },
-            "advertise_service" => Op::AdvertiseService {
-                service: self.name("service")?,
-                type_name: self.optional_text("type")?,
-            },
-            "unadvertise_service" => Op::UnadvertiseService {
-                service: self.name("service")?,
-            },
             "cancel_action_goal" => Op::CancelActionGoal {
                 action: self.name("action")?,
             },
@@ -157,8 +150,8 @@ impl<'a> OpReader<'a> {
                 errors: self.error_form()?,
             },
             "auth" => self.auth()?,
-            "service_response" => self.response()?,
-            _ => self.serve_action()?,
+            op if op.contains("action") => self.serve(Served::Action)?,
+            _ => self.serve(Served::Service)?,
         })
     }
 
@@ -378,7 +371,7 @@ fn duration(seconds: f64, longest: Duration) -> Duration {
     Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
 }
 
-// ---- actions: goals and cancellations from those who send them, the rest from action servers ------------------------
+// ---- actions: goals and cancellations from those who send them, the rest from clients that serve ------------------------
 
 impl OpReader<'_> {
     /// A goal. Once its action is known, every other fault gets an `action_result`.
@@ -405,24 +398,41 @@ impl OpReader<'_> {
         })
     }
 
-    /// An operation of an action server.
-    fn serve_action(&self) -> Result<Op, Problem> {
-        let action = self.name("action")?;
+    /// An operation of a client that serves.
+    fn serve(&self, kind: Served) -> Result<Op, Problem> {
+        if matches!(
+            self.op,
+            "service_response" | "action_feedback" | "action_result"
+        ) {
+            self.required("id")?;
+        }
+        let name = self.name(kind.noun())?;
         let op = match self.op {
-            "advertise_action" => ActionServerOp::Advertise {
+            "advertise_service" | "advertise_action" => ProviderOp::Advertise {
                 type_name: self.optional_text("type")?,
             },
-            "unadvertise_action" => ActionServerOp::Unadvertise,
-            "action_feedback" => {
-                self.required("id")?;
-                let values = self.object("values")?;
-                ActionServerOp::Feedback { values }
-            }
-            _ => {
-                self.required("id")?;
-                let is_good = self.boolean("result")?;
-                ActionServerOp::End {
+            "unadvertise_service" | "unadvertise_action" => ProviderOp::Unadvertise,
+            "service_response" => {
+                let result = self.boolean("result")?;
+                ProviderOp::Respond {
                     // The values of a failure may be a text with the reason.
+                    values: match result {
+                        true => self.object("values")?,
+                        false => self.required("values")?.into(),
+                    },
+                    result,
+                    status: self
+                        .optional("status", "a string", json::text)?
+                        .map(Cow::into_owned),
+                }
+            }
+            "action_feedback" => ProviderOp::Feedback {
+                values: self.object("values")?,
+            },
+            _ => {
+                let is_good = self.boolean("result")?;
+                ProviderOp::End {
+                    // Here a failure may also have none.
                     values: match self.get("values") {
                         Some(_) if is_good => self.object("values")?,
                         values => Payload::from(values.unwrap_or(RawValue::NULL)),
@@ -432,7 +442,7 @@ impl OpReader<'_> {
                 }
             }
         };
-        Ok(Op::ServeAction { action, op })
+        Ok(Op::Serve { kind, name, op })
     }
 
     fn goal_status(&self, is_good: bool) -> Result<u8, Problem> {
@@ -473,33 +483,15 @@ impl OpReader<'_> {
 
     /// Converts a fault in the answer to a call or goal to an op that ends this call or goal.
     fn or_bad_answer(&self, read: Result<Op, Problem>) -> Result<Op, OpError> {
-        let (of_goal, name) = match self.op {
-            "service_response" => (false, "service"),
-            "action_result" => (true, "action"),
+        let kind = match self.op {
+            "service_response" => Served::Service,
+            "action_result" => Served::Action,
             _ => return read.map_err(OpError::Status),
         };
         Ok(read.unwrap_or_else(|problem| Op::BadAnswer {
-            of_goal,
-            name: self.name(name).ok(),
+            kind,
+            name: self.name(kind.noun()).ok(),
             problem,
         }))
-    }
-
-    fn response(&self) -> Result<Op, Problem> {
-        self.required("id")?;
-        let (service, result) = (self.name("service")?, self.boolean("result")?);
-        Ok(Op::ServiceResponse {
-            service,
-            // The values of a failure may be a text with the reason.
-            values: if result {
-                self.object("values")?
-            } else {
-                self.required("values")?.into()
-            },
-            result,
-            status: self
-                .optional("status", "a string", json::text)?
-                .map(Cow::into_owned),
-        })
     }
 }

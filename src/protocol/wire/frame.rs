@@ -85,12 +85,7 @@ impl FrameReader {
     /// Adds bytes from the stream. Take all frames before the next push, so that memory stays bounded.
     pub fn push(&mut self, bytes: &[u8]) {
         self.compact();
-        // Without this a `Vec` would grow to twice [`MEDIUM`] before those bytes arrive.
-        let needed = self.buffer.len() + bytes.len();
-        if needed > self.buffer.capacity() && needed <= MEDIUM && needed > MEDIUM / 2 {
-            self.buffer.reserve_exact(MEDIUM - self.buffer.len());
-        }
-        self.buffer.extend_from_slice(bytes);
+        append(&mut self.buffer, bytes);
     }
 
     /// The series of messages at the present position, if there is one, limited in length. Call this before the next
@@ -284,7 +279,7 @@ impl FrameReader {
         self.state = Within::Between;
         RawFrame {
             bytes,
-            has_literals: self.nesting.has_literals,
+            has_literals: Some(self.nesting.has_literals),
             newline,
         }
     }
@@ -317,9 +312,21 @@ impl Iterator for FrameReader {
     type Item = Result<Frame, FrameError>;
 
     fn next(&mut self) -> Option<Result<Frame, FrameError>> {
-        self.next_raw()
-            .map(|frame| frame?.decode().map_err(|(error, _)| error))
+        match self.next_raw()? {
+            Ok(frame) => Some(frame.decode()?.map_err(|(error, _)| error)),
+            Err(error) => Some(Err(error)),
+        }
     }
+}
+
+/// Appends received bytes. Without a permit, the buffer stays within [`MEDIUM`]: by itself a `Vec` would grow to twice
+/// as much before those bytes arrive.
+pub(super) fn append(buffer: &mut Vec<u8>, bytes: &[u8]) {
+    let needed = buffer.len() + bytes.len();
+    if needed > buffer.capacity() && needed <= MEDIUM && needed > MEDIUM / 2 {
+        buffer.reserve_exact(MEDIUM - buffer.len());
+    }
+    buffer.extend_from_slice(bytes);
 }
 
 fn not_an_object(line: &[u8]) -> FrameError {
@@ -383,9 +390,6 @@ pub enum FrameError {
         /// Index of the first bad byte within the frame.
         at: usize,
     },
-    /// Text of a WebSocket that is not UTF-8.
-    #[error("malformed frame: the text of a WebSocket must be UTF-8")]
-    NotText,
 }
 
 /// The next part of a stream.
@@ -393,10 +397,8 @@ pub enum FrameError {
 pub enum FramePart {
     /// Messages of a client on a topic of clients that can be forwarded unchanged.
     Lines(Series),
-    /// Any other frame.
+    /// Any other frame, or a whole WebSocket message.
     Frame(RawFrame),
-    /// A whole WebSocket message, not yet scanned.
-    Message(Bytes),
     /// A part that is not a frame, with its first bytes, at most [`KEPT_START`].
     Error(FrameError, Vec<u8>),
 }
@@ -410,38 +412,29 @@ pub(super) fn start_of(bytes: &[u8]) -> Vec<u8> {
     bytes.get(..KEPT_START).unwrap_or(bytes).to_vec()
 }
 
-/// A [`Frame`] that has only been scanned for its end. Another thread may parse it.
+/// A [`Frame`] that has only been scanned for its end, or a message. Another thread may parse it.
 #[derive(Debug)]
 pub struct RawFrame {
     bytes: Vec<u8>,
-    /// Whether it may contain `NaN` or `Infinity`.
-    has_literals: bool,
+    /// Whether it may contain `NaN` or `Infinity`. `None` for a message, which is not scanned yet.
+    has_literals: Option<bool>,
     newline: bool,
 }
 
 impl RawFrame {
-    /// The frame in a message, which may be pretty-printed. `None` if the message has only white space.
-    ///
-    /// # Errors
-    /// If it is not one object, with its first bytes.
-    pub fn of_message(message: &[u8]) -> Option<Result<Self, (FrameError, Vec<u8>)>> {
-        let text = message.trim_ascii();
-        if text.is_empty() {
-            return None;
+    /// A message of a WebSocket, which may be pretty-printed.
+    #[must_use]
+    pub const fn of_message(bytes: Vec<u8>) -> Self {
+        Self {
+            bytes,
+            has_literals: None,
+            newline: true,
         }
-        Some(match one_object(text) {
-            Ok(has_literals) => Ok(Self {
-                bytes: text.to_vec(),
-                has_literals,
-                newline: true,
-            }),
-            Err(error) => Err((error, start_of(text))),
-        })
     }
 
-    /// Its length in bytes; never 0.
+    /// Its length in bytes.
     #[must_use]
-    #[allow(clippy::len_without_is_empty, reason = "it has at least two braces")]
+    #[allow(clippy::len_without_is_empty, reason = "only a message may be empty")]
     pub const fn len(&self) -> usize {
         self.bytes.len()
     }
@@ -452,22 +445,36 @@ impl RawFrame {
         self.newline
     }
 
-    /// The frame.
+    /// The frame. `None` for a message that has only white space.
     ///
     /// # Errors
-    /// If it is not UTF-8, with the frame's first bytes.
-    pub fn decode(self) -> Result<Frame, (FrameError, Vec<u8>)> {
-        let text = String::from_utf8(self.bytes).map_err(|error| {
-            let at = error.utf8_error().valid_up_to();
-            (FrameError::NotUtf8 { at }, start_of(error.as_bytes()))
-        })?;
-        let text = if self.has_literals {
-            json::accept_literals(text)
-        } else {
-            text
+    /// If it is not one object in UTF-8, with its first bytes.
+    pub fn decode(mut self) -> Option<Result<Frame, (FrameError, Vec<u8>)>> {
+        let has_literals = match self.has_literals {
+            Some(has_literals) => has_literals,
+            None => {
+                self.bytes.truncate(self.bytes.trim_ascii_end().len());
+                let space = self.bytes.len() - self.bytes.trim_ascii_start().len();
+                self.bytes.drain(..space);
+                if self.bytes.is_empty() {
+                    return None;
+                }
+                match one_object(&self.bytes) {
+                    Ok(has_literals) => has_literals,
+                    Err(error) => return Some(Err((error, start_of(&self.bytes)))),
+                }
+            }
         };
         let newline = self.newline;
-        Ok(Frame { text, newline })
+        let frame = match String::from_utf8(self.bytes) {
+            Ok(text) if has_literals => Ok(json::accept_literals(text)),
+            Ok(text) => Ok(text),
+            Err(error) => {
+                let at = error.utf8_error().valid_up_to();
+                Err((FrameError::NotUtf8 { at }, start_of(error.as_bytes())))
+            }
+        };
+        Some(frame.map(|text| Frame { text, newline }))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Bytes to frames and back: lines, nesting, fragments, text and JSON.
+//! Bytes to frames and back: lines, messages, nesting, fragments, text and JSON.
 //!
 //! **Invariant:** bytes are split and checked here. `op` interprets them.
 
@@ -8,3 +8,4 @@ pub mod json;
 pub mod opening;
 pub mod series;
 pub(crate) mod text;
+pub mod websocket;

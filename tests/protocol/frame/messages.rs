@@ -8,8 +8,7 @@ use super::nested;
 
 /// The text of the frame; `None` if there is only white space.
 fn read(message: &str) -> Option<Result<String, FrameError>> {
-    let frame = RawFrame::of_message(message.as_bytes())?;
-    let decoded = frame.and_then(RawFrame::decode);
+    let decoded = RawFrame::of_message(message.into()).decode()?;
     Some(decoded.map(|frame| frame.text).map_err(|(error, start)| {
         assert!(message.trim().as_bytes().starts_with(&start), "{message:?}");
         error
@@ -58,8 +57,8 @@ fn a_message_that_is_not_one_object_is_refused_as_a_whole() {
     ] {
         assert_eq!(read(message), Some(Err(why)), "{message:?}");
     }
-    let not_utf8 = RawFrame::of_message(b"{\"\xff\":1}").unwrap().unwrap();
-    let (error, _) = not_utf8.decode().unwrap_err();
+    let not_utf8 = RawFrame::of_message(b"{\"\xff\":1}".to_vec());
+    let (error, _) = not_utf8.decode().unwrap().unwrap_err();
     assert_eq!(error, FrameError::NotUtf8 { at: 2 });
 }
 

@@ -19,14 +19,7 @@ fn without_the_feature_no_crate_of_the_web_door_is_built_in() {
         tree(&[]),
         tree(&["--no-default-features", "--features", "runtime"]),
     );
-    for name in [
-        "hyper",
-        "tokio-tungstenite",
-        "tungstenite",
-        "httparse",
-        "sha1",
-        "rand",
-    ] {
+    for name in ["hyper", "tungstenite", "httparse", "sha1", "rand"] {
         let named = |tree: &str| {
             tree.lines()
                 .any(|line| line.starts_with(&format!("{name} v")))

@@ -130,16 +130,16 @@ impl<const N: usize> Handler<ForwardGoal<FollowPath<N>>> for PathFollower<N> {
 impl<const N: usize> Handler<CancelSent> for PathFollower<N> {
     type Result = ();
 
-    fn handle(&mut self, CancelSent { from, done }: CancelSent, ctx: &mut Context<Self>) {
-        let is_meant = |goal: &ActivePath<N>| goal.client.is(&from.goal);
+    fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
+        let is_meant = |goal: &ActivePath<N>| goal.client.is(&cancel.goal);
         let Some(goal) = self.active.take_if(|goal| is_meant(goal)) else {
-            return from.refuse(NOT_ACTIVE);
+            return cancel.refuse(NOT_ACTIVE);
         };
         let halted = self.halt(goal.setpoint).into_actor(self);
         ctx.wait(halted.map(move |(), _, _| {
             let values = result(ResultCode::Successful, "cancelled");
             goal.client.conclude(values, GoalStatus::Canceled);
-            drop(done);
+            drop(cancel.done);
         }));
     }
 }

@@ -152,13 +152,16 @@ impl<const N: usize> Handler<CancelSent> for IkAction<N> {
     type Result = ();
 
     /// The client is informed if that goal is not active. Otherwise the goal's result is the answer.
-    fn handle(&mut self, CancelSent { from, done }: CancelSent, ctx: &mut Context<Self>) {
-        let cancellation = self.end(&GoalSelector::Sent(from.goal.clone()), GoalStatus::Canceled);
+    fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
+        let cancellation = self.end(
+            &GoalSelector::Sent(cancel.goal.clone()),
+            GoalStatus::Canceled,
+        );
         ctx.wait(cancellation.map(move |outcome, _, _| {
             if let Err(why @ CancelRejected::NotSent) = outcome {
-                from.refuse(&why.to_string());
+                cancel.refuse(&why.to_string());
             }
-            drop(done);
+            drop(cancel.done);
         }));
     }
 }

@@ -19,17 +19,15 @@ use crate::actors::resources::work_clock;
 /// Longest time of one computation on a worker before the next one. It is short compared with the 5 ms by which a
 /// client may be delayed, and long compared with the cost of switching.
 pub const SLICE: Duration = Duration::from_millis(1);
-/// Pause between two tries of computations that cannot begin.
+/// Pause between two tries while no computation can begin.
 const TRY_AGAIN: Duration = Duration::from_millis(10);
-/// Computations that try at the same time.
-const TRIES: usize = 32;
 
 /// The state of a computation after a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
     /// It waits for its next turn.
     Unfinished,
-    /// It cannot begin yet, and tries again when another has ended, or after a pause.
+    /// It cannot begin yet, and tries again at its next turn.
     Waiting,
     /// It has sent its answer and can be dropped.
     Finished,
@@ -58,25 +56,12 @@ struct Queue {
     /// Computations that wait for their next slice.
     ready: VecDeque<Job>,
     running: usize,
-    /// Computations that cannot begin yet.
-    waiting: VecDeque<Job>,
-    /// The last time that computations that cannot begin have tried.
-    tried: Option<Instant>,
+    /// Turns in a row in which a computation could not begin.
+    stalled: usize,
     closed: Option<&'static str>,
 }
 
 impl Queue {
-    /// Lets up to `most` computations that could not begin try again.
-    fn retry(&mut self, most: usize) {
-        self.tried = Some(Instant::now());
-        let most = most.min(self.waiting.len());
-        self.ready.extend(self.waiting.drain(..most));
-    }
-
-    fn admitted(&self) -> usize {
-        self.ready.len() + self.running + self.waiting.len()
-    }
-
     fn next(&mut self) -> Option<Job> {
         let job = self.ready.pop_front()?;
         self.running += 1;
@@ -110,17 +95,10 @@ impl WorkerPool {
         Self::default()
     }
 
-    /// Computes the next slice in the calling thread; `false` if there is none. Computations that could not begin try
-    /// again if there is no other slice.
+    /// Computes the next slice in the calling thread; `false` if there is none.
     #[must_use]
     pub fn turn(&self) -> bool {
-        let next = {
-            let mut queue = self.lock();
-            if queue.ready.is_empty() {
-                queue.retry(usize::MAX);
-            }
-            queue.next()
-        };
+        let next = self.lock().next();
         next.map(|job| self.advance(job)).is_some()
     }
 
@@ -135,6 +113,7 @@ impl WorkerPool {
         let mut queue = self.lock();
         let Some(why) = queue.closed else {
             queue.ready.push_back(computation);
+            queue.stalled = 0;
             return self.shared.1.notify_one();
         };
         drop(queue);
@@ -147,7 +126,6 @@ impl WorkerPool {
         let waiting = {
             let mut queue = self.lock();
             queue.closed = Some(why);
-            queue.retry(usize::MAX);
             std::mem::take(&mut queue.ready)
         };
         self.shared.1.notify_all();
@@ -159,7 +137,8 @@ impl WorkerPool {
     /// Whether no computation waits or runs.
     #[must_use]
     pub fn is_idle(&self) -> bool {
-        self.lock().admitted() == 0
+        let queue = self.lock();
+        queue.ready.is_empty() && queue.running == 0
     }
 
     /// The queue. A poisoned lock is used, because the queue is never half changed.
@@ -171,23 +150,19 @@ impl WorkerPool {
     fn take(&self) -> Option<Job> {
         let mut queue = self.lock();
         loop {
-            let is_due = queue.tried.is_none_or(|tried| tried.elapsed() >= TRY_AGAIN);
-            if is_due && !queue.waiting.is_empty() {
-                queue.retry(TRIES);
-                self.shared.1.notify_all();
-            }
-            if let Some(job) = queue.next() {
-                return Some(job);
-            }
             if queue.closed.is_some() {
                 return None;
             }
-            queue = if queue.waiting.is_empty() {
+            queue = if queue.ready.is_empty() {
                 let woken = self.shared.1.wait(queue);
                 woken.unwrap_or_else(PoisonError::into_inner)
+            } else if queue.stalled < queue.ready.len() {
+                return queue.next();
             } else {
                 let woken = self.shared.1.wait_timeout(queue, TRY_AGAIN);
-                woken.unwrap_or_else(PoisonError::into_inner).0
+                let (mut queue, _) = woken.unwrap_or_else(PoisonError::into_inner);
+                queue.stalled = 0;
+                queue
             };
         }
     }
@@ -204,13 +179,11 @@ impl WorkerPool {
             match (progress, queue.closed) {
                 (Progress::Finished, _) => None,
                 (_, Some(why)) => Some(why),
-                (Progress::Unfinished, None) => {
+                (_, None) => {
+                    let is_stalled = progress == Progress::Waiting;
+                    queue.stalled = if is_stalled { queue.stalled + 1 } else { 0 };
                     queue.running -= 1;
                     return queue.ready.push_back(job);
-                }
-                (Progress::Waiting, None) => {
-                    queue.running -= 1;
-                    return queue.waiting.push_back(job);
                 }
             }
         };
@@ -221,7 +194,7 @@ impl WorkerPool {
         }
         let mut queue = self.lock();
         queue.running -= 1;
-        queue.retry(usize::MAX);
+        queue.stalled = 0;
         self.shared.1.notify_all();
     }
 }

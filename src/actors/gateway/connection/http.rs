@@ -97,11 +97,10 @@ impl ClientSession {
             permit: None,
         };
         let _ = self.registry.send(quiet).await;
-        let socket = WebSocket::open(stream, behind, self.memory.clone()).await;
         Some(Opened {
             place: Ok(place),
-            transport: Transport::WebSocket(Box::new(socket)),
-            first: BytesMut::new(),
+            transport: Transport::WebSocket(Box::new(WebSocket::new(stream))),
+            first: behind.into(),
         })
     }
 }

@@ -143,8 +143,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
         };
         let session = ClientSession {
             registry: self.registry.clone(),
-            #[cfg(feature = "web")]
-            memory: self.memory.clone(),
             finish: Arc::clone(&self.finish),
             admission,
             ends: self.ends,

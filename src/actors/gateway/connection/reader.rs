@@ -5,7 +5,6 @@
 //! client's requests take effect in the order sent. A series of messages counts as one op. One poll reads a bounded
 //! number of bytes and performs a bounded number of ops. Every frame becomes one op or one error.
 
-use std::collections::VecDeque;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -19,7 +18,7 @@ use tokio::time::Instant;
 use super::flow::has_closed;
 use super::session::Opened;
 use super::timer::Timer;
-use super::transport::ReceivedData;
+use super::transport::Transport;
 use super::turns::Turns;
 use super::writer::ClientWriter;
 use super::{Connection, Ends};
@@ -29,7 +28,7 @@ use crate::actors::gateway::limits::{
     CLOSED_CHECK, DISCARD_BYTES, DISCARD_TIME, FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, READ_BYTES,
     RESPONSES_TIME,
 };
-use crate::actors::gateway::messages::{Disconnect, Request, Respond, Retire, form_of};
+use crate::actors::gateway::messages::{Disconnect, FrameKind, Request, Respond, Retire, form_of};
 use crate::actors::gateway::registry::Registry;
 use crate::actors::panics::contain;
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
@@ -41,27 +40,20 @@ use crate::protocol::op::{
     self, CallService, Compression, GoalStatus, Incoming, Op, OpError, Problem, Subscribe,
 };
 use crate::protocol::wire::fragments::{Fragments, MAX_AGE};
-use crate::protocol::wire::frame::{
-    Foreign, FrameError, FramePart, FrameReader, RawFrame, is_host_line,
-};
+use crate::protocol::wire::frame::{Foreign, FrameError, FramePart, RawFrame, is_host_line};
 use crate::protocol::wire::json::Payload;
 
 /// The error for a frame that takes longer than [`FRAME_TIME`].
 const TOO_SLOW: &str = "a frame that has begun must be complete within a minute";
-/// Stands for the start of a message that could not be read. It may be the answer to the only call that waits.
-const LOST_START: &[u8] = br#"{"op":"service_response","#;
 
 type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 
 /// The reading half of a connection.
 struct ClientReader {
     step: ReadStep,
-    frames: FrameReader,
-    /// Received bytes that `frames` does not have yet.
+    /// Received bytes that the transport has not read yet.
     chunk: BytesMut,
-    /// Received messages of a WebSocket. A long one has its memory permit.
-    messages: VecDeque<(Bytes, Option<Permit>)>,
-    /// Whether all complete frames have been taken out of `frames`.
+    /// Whether all complete frames have been taken out of the transport.
     is_cut: bool,
     /// `None` while it performs an op.
     performer: Option<Performer>,
@@ -76,8 +68,6 @@ struct ClientReader {
     closed_check: Option<Instant>,
     /// The stream has ended. Earlier bytes may still wait.
     has_ended: bool,
-    /// Why the last message of a WebSocket could not be read. The client is then refused.
-    unreadable: Option<FrameError>,
     /// The last op is being performed.
     is_last: bool,
     turns: Turns,
@@ -131,9 +121,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         };
         ctx.spawn(ClientReader {
             step,
-            frames: FrameReader::new(),
             chunk: opened.first,
-            messages: VecDeque::new(),
             is_cut: true,
             performer,
             performing: None,
@@ -142,7 +130,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             waits_since: None,
             closed_check: None,
             has_ended: false,
-            unreadable: None,
             is_last: false,
             turns: Turns::default(),
             timer: Timer::default(),
@@ -184,10 +171,7 @@ impl ClientReader {
             match &mut self.step {
                 ReadStep::Frames => {
                     self.step = match ready!(self.poll_frames(connection, cx)) {
-                        Ok(()) => {
-                            connection.is_refused |= self.unreadable.is_some();
-                            Self::retire(connection)
-                        }
+                        Ok(()) => Self::retire(connection),
                         // A broken stream takes no answers, so pending computations are dropped.
                         Err(lost) => {
                             connection.is_refused |= lost != ClientLost::Gone;
@@ -222,7 +206,7 @@ impl ClientReader {
                         return Poll::Ready(());
                     };
                     self.chunk.clear();
-                    match transport.poll_swallow(cx, &mut self.chunk) {
+                    match transport.poll_read(cx, &mut self.chunk) {
                         Poll::Ready(Ok(bytes)) if bytes > 0 && *left > bytes => {
                             *left -= bytes;
                             self.turns.end(cx);
@@ -290,11 +274,12 @@ impl ClientReader {
                     ready!(self.poll_ahead(connection, cx))?;
                     continue;
                 }
-                if self.cut(connection) {
+                if self.cut(connection)? {
                     continue;
                 }
-                if connection.is_finishing {
-                    return self.poll_last(cx);
+                // A client with messages is read until it answers the close frame.
+                if connection.is_finishing && !transport_of(connection)?.has_messages() {
+                    return self.poll_last(connection, cx);
                 }
             }
             if let Some(room) = &mut self.room {
@@ -315,39 +300,14 @@ impl ClientReader {
             }
             if !self.chunk.is_empty() {
                 bytes += self.chunk.len();
-                self.frames.push(&self.chunk);
+                transport_of(connection)?.push(&self.chunk);
                 self.chunk.clear();
                 self.is_cut = false;
             } else if self.has_ended {
-                return self.poll_last(cx);
-            } else {
-                let Some(received) = ready!(self.poll_read(connection, cx))? else {
-                    connection.refuse(refusal(TOO_SLOW));
-                    return Poll::Ready(Ok(()));
-                };
-                bytes += self.take_in(received);
-            }
-        }
-    }
-
-    /// Stores received data. Returns the bytes of a message.
-    fn take_in(&mut self, received: ReceivedData) -> usize {
-        match received {
-            ReceivedData::Bytes(bytes) => {
-                self.has_ended = bytes == 0;
-                0
-            }
-            #[cfg(feature = "web")]
-            ReceivedData::Message(message, permit) => {
-                let bytes = message.len();
-                self.messages.push_back((message, permit));
-                self.is_cut = false;
-                bytes
-            }
-            #[cfg(feature = "web")]
-            ReceivedData::Unreadable(error) => {
-                (self.has_ended, self.unreadable) = (true, Some(error));
-                0
+                return self.poll_last(connection, cx);
+            } else if !ready!(self.poll_read(connection, cx))? {
+                connection.refuse(refusal(TOO_SLOW));
+                return Poll::Ready(Ok(()));
             }
         }
     }
@@ -375,96 +335,83 @@ impl ClientReader {
     }
 
     /// Takes the next frame, if it is complete, and begins to perform it.
-    fn cut<S: AsyncRead + AsyncWrite + Unpin>(&mut self, connection: &mut Connection<S>) -> bool {
+    fn cut<S: AsyncRead + AsyncWrite + Unpin>(
+        &mut self,
+        connection: &mut Connection<S>,
+    ) -> Result<bool, ClientLost> {
         let Some(mut performer) = self.performer.take() else {
-            return false;
+            return Ok(false);
         };
-        performer.give_back(self.is_long_coming());
+        let transport = transport_of(connection)?;
+        performer.give_back(transport.is_long_coming());
         self.waits_since = None;
-        let cut = match self.messages.pop_front() {
-            Some((message, permit)) => {
-                performer.permit = permit.or(performer.permit);
-                Some(FramePart::Message(message))
-            }
-            None => self.frames.cut(),
-        };
-        if cut.is_some() || !self.frames.is_unfinished() {
+        let cut = transport.cut()?;
+        if cut.is_some() || !transport.is_unfinished() {
             self.frame_due = None;
         }
         let Some(cut) = cut else {
             self.is_cut = true;
-            if performer.permit.is_none() && self.is_long_coming() {
+            if performer.permit.is_none() && transport.is_long_coming() {
                 self.frame_due = None;
                 self.room = Some(Box::pin(performer.room()));
             }
             self.performer = Some(performer);
-            return false;
+            return Ok(false);
         };
         match &cut {
             FramePart::Lines(_) => connection.outgoing.set_singly(false),
             FramePart::Frame(frame) => connection.outgoing.set_singly(!frame.newline()),
-            FramePart::Message(_) | FramePart::Error(..) => {}
+            FramePart::Error(..) => {}
         }
         self.performing = Some(Box::pin(performer.take(cut)));
-        true
+        Ok(true)
     }
 
-    /// Whether a frame is incomplete, and so long that it needs a memory permit.
-    fn is_long_coming(&self) -> bool {
-        self.frames.is_unfinished() && self.frames.buffered() > MEDIUM
-    }
-
-    /// Handles the end of the stream. An incomplete or unreadable frame is an error.
-    fn poll_last(&mut self, cx: &mut task::Context<'_>) -> Poll<Result<(), ClientLost>> {
+    /// Handles the end of the stream. An incomplete frame is an error.
+    fn poll_last<S: AsyncRead + AsyncWrite + Unpin>(
+        &mut self,
+        connection: &mut Connection<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<Result<(), ClientLost>> {
         let performer = self.performer.take();
-        let lost = self.unreadable.clone().map(|error| (error, LOST_START));
-        let error = lost.or_else(|| Some((self.frames.finish()?, &[])));
-        let Some((performer, (error, start))) = performer.zip(error) else {
+        let error = transport_of(connection)?.finish();
+        let Some((performer, error)) = performer.zip(error) else {
             return Poll::Ready(Ok(()));
         };
         self.is_last = true;
-        let part = FramePart::Error(error, start.to_vec());
+        let part = FramePart::Error(error, Vec::new());
         self.performing = Some(Box::pin(performer.take(part)));
         self.turns.end(cx);
         Poll::Pending
     }
 
-    /// Reads more data. Returns `None` if an incomplete frame takes too long. Meanwhile drops expired pieces of
-    /// messages.
+    /// Reads more data. Returns false if an incomplete frame takes too long. Meanwhile drops expired pieces of messages.
     fn poll_read<S: AsyncRead + AsyncWrite + Unpin>(
         &mut self,
         connection: &mut Connection<S>,
         cx: &mut task::Context<'_>,
-    ) -> Poll<Result<Option<ReceivedData>, ClientLost>> {
-        let Some(transport) = &mut connection.transport else {
-            return Poll::Ready(Err(ClientLost::Gone));
-        };
+    ) -> Poll<Result<bool, ClientLost>> {
+        let transport = transport_of(connection)?;
         if let Poll::Ready(read) = transport.poll_read(cx, &mut self.chunk) {
-            return Poll::Ready(read.map(Some));
+            self.has_ended = read? == 0;
+            return Poll::Ready(Ok(true));
         }
         self.turns.rest();
-        let is_unfinished = self.frames.is_unfinished() || transport.is_unfinished();
         let begin = || Instant::now() + FRAME_TIME;
+        let is_unfinished = transport.is_unfinished();
         let late = is_unfinished.then(|| *self.frame_due.get_or_insert_with(begin));
         self.frame_due = late;
-        if transport.waits_for_room() {
-            ready!(self.poll_gone(connection.ends, late, cx));
-            if late.is_none_or(|late| Instant::now() < late) {
-                return Poll::Ready(Err(ClientLost::Gone));
-            }
-        }
         loop {
             let pieces = self.performer.as_mut();
             let began = pieces.and_then(|performer| performer.fragments.began());
             let old = began.map(|began| Instant::from_std(began) + MAX_AGE + LOOK_AGAIN);
             ready!(self.timer.poll(late.into_iter().chain(old).min(), cx));
             if late.is_some_and(|late| late <= Instant::now()) {
-                return Poll::Ready(transport.give_up(TOO_SLOW).map(|()| None));
+                return Poll::Ready(transport.give_up(TOO_SLOW).map(|()| false));
             }
-            let is_coming = self.is_long_coming();
             if let Some(performer) = &mut self.performer {
                 performer.fragments.forget_old(Instant::now().into_std());
-                performer.give_back(is_coming);
+                performer.give_back(transport.is_long_coming());
             }
         }
     }
@@ -487,32 +434,32 @@ impl ClientReader {
         }
     }
 
-    /// Waits until something was written or computed. Meanwhile reads up to [`READ_BYTES`] bytes or [`FRAMES_IN_A_ROW`]
-    /// messages, to detect the end of the stream. Returns an error if the client has disconnected. A client that has
+    /// Waits until something was written or computed. Meanwhile reads up to [`READ_BYTES`] bytes, to detect the end of the
+    /// stream. Returns an error if the client has disconnected. A client that has
     /// ended its stream counts as disconnected if nothing was written or computed for [`RESPONSES_TIME`].
     fn poll_ahead<S: AsyncRead + AsyncWrite + Unpin>(
         &mut self,
         connection: &mut Connection<S>,
         cx: &mut task::Context<'_>,
     ) -> Poll<Result<(), ClientLost>> {
-        let Some(transport) = &mut connection.transport else {
-            return Poll::Ready(Err(ClientLost::Gone));
-        };
         if self.has_ended {
             let since = *self.waits_since.get_or_insert_with(Instant::now);
             let due = since.max(connection.room_since) + RESPONSES_TIME;
             ready!(self.poll_gone(connection.ends, Some(due), cx));
             return Poll::Ready(Err(ClientLost::Gone));
         }
-        let messages = self.messages.iter().map(|(message, _)| message.len());
-        let bytes = self.chunk.len() + messages.sum::<usize>();
-        if bytes >= READ_BYTES || self.messages.len() >= FRAMES_IN_A_ROW {
+        let transport = transport_of(connection)?;
+        if self.chunk.len() + transport.taken_ahead() >= READ_BYTES {
             return Poll::Pending;
         }
-        let received = ready!(transport.poll_read(cx, &mut self.chunk))?;
-        self.take_in(received);
-        Poll::Ready(Ok(()))
+        self.has_ended = ready!(transport.poll_read(cx, &mut self.chunk))? == 0;
+        Poll::Ready(transport.look_ahead(&mut self.chunk))
     }
+}
+
+/// The transport of a client that is served.
+fn transport_of<S>(connection: &mut Connection<S>) -> Result<&mut Transport<S>, ClientLost> {
+    connection.transport.as_mut().ok_or(ClientLost::Gone)
 }
 
 // ---- from a frame to its effect -------------------------------------------------------------------------------------
@@ -583,16 +530,7 @@ impl Performer {
 
     async fn perform_part(&mut self, cut: FramePart) -> OpOutcome {
         match cut {
-            FramePart::Frame(frame) => {
-                let length = frame.len();
-                self.perform_frame(length, move || Some(read(Ok(frame))))
-                    .await
-            }
-            FramePart::Message(message) => {
-                let length = message.len();
-                self.perform_frame(length, move || read_message(&message))
-                    .await
-            }
+            FramePart::Frame(frame) => self.perform_frame(frame).await,
             FramePart::Lines(lines) => {
                 self.speaks_json = true;
                 self.perform(None, Op::PublishLines(lines), 0).await
@@ -606,17 +544,14 @@ impl Performer {
         }
     }
 
-    /// Reads a frame of `length` bytes and performs it.
-    async fn perform_frame(
-        &mut self,
-        length: usize,
-        read: impl FnOnce() -> Option<Incoming> + Send + 'static,
-    ) -> OpOutcome {
+    /// Reads a frame and performs it.
+    async fn perform_frame(&mut self, frame: RawFrame) -> OpOutcome {
+        let length = frame.len();
         self.speaks_json = true;
         if length > MEDIUM {
             self.take_room().await;
         }
-        let incoming = match read_frame(length, read).await {
+        let incoming = match read_frame(length, move || read(frame)).await {
             Ok(incoming) => incoming,
             Err(outcome) => return outcome,
         };
@@ -643,13 +578,13 @@ impl Performer {
             Err(OpError::Call { service, problem }) => {
                 let why = problem.to_string();
                 let form = form_of(&self.wants_text);
-                self.say(messages::failure(&service, id.as_ref(), &why, form), None)
-                    .await
+                let failure = messages::failure(&service, id.as_ref(), &why, form);
+                self.say(failure, FrameKind::End).await
             }
             Err(OpError::Goal { action, problem }) => {
                 let (id, why, status) = (id.as_ref(), problem.to_string(), GoalStatus::Unknown);
                 let result = messages::action_result(&action, id, &why, status as u8, false);
-                self.say(result, None).await
+                self.say(result, FrameKind::End).await
             }
             Err(OpError::Status(why)) => self.send_error(&why.to_string(), id.as_ref()).await,
         }
@@ -676,7 +611,8 @@ impl Performer {
             }
         };
         let length = whole.bytes();
-        let whole = read_frame(length, move || read_message(whole.text().as_bytes())).await?;
+        let join = move || RawFrame::of_message(whole.text().into_bytes());
+        let whole = read_frame(length, move || read(join())).await?;
         let whole = match whole.op {
             Ok(Op::Fragment(_)) => Incoming {
                 id,
@@ -691,19 +627,18 @@ impl Performer {
     /// Sends the client an error status.
     async fn send_error(&self, why: &str, id: Option<&Payload>) -> OpOutcome {
         tracing::debug!(connection = self.id.0, why, "refused");
-        self.say(messages::status(Level::Error, why, id), Some(Level::Error))
-            .await
+        let status = messages::status(Level::Error, why, id);
+        self.say(status, FrameKind::Status(Level::Error)).await
     }
 
     /// Sends a frame to the client through the registry. Its mailbox may still have a response to an earlier frame,
     /// which must arrive first.
-    async fn say(&self, frame: Bytes, status: Option<Level>) -> OpOutcome {
+    async fn say(&self, frame: Bytes, kind: FrameKind) -> OpOutcome {
         let frame = cover(self.permit.as_ref(), frame);
         let respond = Respond {
             connection: self.id,
             frame: Box::new(move || frame),
-            service: None,
-            status,
+            kind,
             done: None,
         };
         let _ = self.registry.send(respond).await;
@@ -757,15 +692,10 @@ fn under_id(incoming: Incoming, id: Option<Payload>) -> Incoming {
     }
 }
 
-/// Parses a complete frame, or returns its error.
-fn read(frame: Result<RawFrame, (FrameError, Vec<u8>)>) -> Incoming {
-    match frame.and_then(RawFrame::decode) {
+/// Parses a complete frame, or returns its error. `None` for a message that has only white space.
+fn read(frame: RawFrame) -> Option<Incoming> {
+    Some(match frame.decode()? {
         Ok(frame) => op::read(&frame.text),
         Err((error, start)) => op::read_start(&start, &error),
-    }
-}
-
-/// Parses a message of a WebSocket, or a frame that was joined from pieces. `None` if it has only white space.
-fn read_message(message: &[u8]) -> Option<Incoming> {
-    RawFrame::of_message(message).map(read)
+    })
 }

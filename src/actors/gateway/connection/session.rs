@@ -25,21 +25,16 @@ use crate::actors::gateway::limits::{
 };
 use crate::actors::gateway::messages::{Connect, CountRefusal, Disconnect, Outlets, Refused};
 use crate::actors::gateway::registry::Registry;
-#[cfg(feature = "web")]
-use crate::actors::resources::memory::Memory;
 use crate::protocol::messages::{self, Level};
 #[cfg(feature = "web")]
 use crate::protocol::wire::frame::Foreign;
-use crate::protocol::wire::frame::{Opening, opening};
+use crate::protocol::wire::frame::{FrameReader, Opening, opening};
 #[cfg(feature = "web")]
 use crate::web::response::refusal;
 
 /// A client whose protocol is being detected.
 pub(super) struct ClientSession {
     pub(super) registry: Addr<Registry>,
-    /// The shared memory for long messages.
-    #[cfg(feature = "web")]
-    pub(super) memory: Memory,
     /// Notified when the runtime ends the connection first.
     pub(super) finish: Arc<Notify>,
     pub(super) admission: Arc<Admission>,
@@ -145,7 +140,7 @@ impl ClientSession {
         };
         Some(Opened {
             place,
-            transport: Transport::Plain(stream),
+            transport: Transport::Plain(stream, FrameReader::new()),
             first,
         })
     }

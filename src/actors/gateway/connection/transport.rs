@@ -1,7 +1,7 @@
 //! The transport of a client's frames: plain bytes, or a WebSocket around them.
 //!
-//! **Invariant:** the reader gets whole messages, or a byte stream. In a stream, a frame ends at its closing brace or
-//! at the end of its line. The writer passes whole frames that end in a newline, for both transports.
+//! **Invariant:** the reader gets frames, and the writer passes whole frames that end in a newline, for both
+//! transports.
 
 use std::io::{self, IoSlice};
 use std::pin::{Pin, pin};
@@ -15,83 +15,120 @@ use tokio::time::Instant;
 use super::websocket::WebSocket;
 use crate::actors::gateway::ends::ClientLost;
 use crate::actors::gateway::limits::{READ_BYTES, WRITE_BYTES, WRITE_FRAMES};
-#[cfg(feature = "web")]
-use crate::actors::resources::memory::Permit;
-#[cfg(feature = "web")]
-use crate::protocol::wire::frame::FrameError;
+use crate::protocol::limits::MEDIUM;
+use crate::protocol::wire::frame::{FrameError, FramePart, FrameReader};
 
 /// The stream of a served client, and its protocol.
 pub(super) enum Transport<S> {
-    Plain(S),
+    Plain(S, FrameReader),
     #[cfg(feature = "web")]
     WebSocket(Box<WebSocket<S>>),
-}
-
-/// Data from a client.
-#[cfg_attr(not(feature = "web"), derive(Clone, Copy))]
-pub(super) enum ReceivedData {
-    /// This many bytes of a stream. 0 at its end, after which the client may still read.
-    Bytes(usize),
-    /// A message, and its memory permit if it is long.
-    #[cfg(feature = "web")]
-    Message(Bytes, Option<Permit>),
-    /// A message that is too long, or whose text is not UTF-8. It is the last one.
-    #[cfg(feature = "web")]
-    Unreadable(FrameError),
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
     /// Whether its frames are messages, which may be binary. The peer then answers the end of the connection.
     pub(super) const fn has_messages(&self) -> bool {
         match self {
-            Self::Plain(_) => false,
+            Self::Plain(..) => false,
             #[cfg(feature = "web")]
             Self::WebSocket(_) => true,
         }
     }
 
-    /// Appends the available bytes of a stream, or returns the next message.
+    // ---- receiving --------------------------------------------------------------------------------------------------
+
+    /// Appends at most [`READ_BYTES`] available bytes to `chunk`. Returns 0 at the end of the stream, after which the
+    /// client may still read. A WebSocket must not end without a close frame.
     pub(super) fn poll_read(
         &mut self,
         cx: &mut Context<'_>,
         chunk: &mut BytesMut,
-    ) -> Poll<Result<ReceivedData, ClientLost>> {
-        Poll::Ready(match self {
-            Self::Plain(stream) => match ready!(read_available(stream, cx, chunk)) {
-                Ok(bytes) => Ok(ReceivedData::Bytes(bytes)),
-                Err(_) => Err(ClientLost::Gone),
-            },
+    ) -> Poll<Result<usize, ClientLost>> {
+        let stream = match self {
+            Self::Plain(stream, _) => stream,
             #[cfg(feature = "web")]
-            Self::WebSocket(socket) => match ready!(socket.poll_read(cx)) {
-                Ok((message, permit)) => Ok(ReceivedData::Message(message, permit)),
-                Err(ClientLost::Unreadable(error)) => Ok(ReceivedData::Unreadable(error)),
-                Err(lost) => Err(lost),
-            },
+            Self::WebSocket(socket) => &mut socket.stream,
+        };
+        let read = ready!(pin!(read_some(stream, chunk)).poll(cx));
+        Poll::Ready(match (read, self) {
+            (Err(_), _) => Err(ClientLost::Gone),
+            #[cfg(feature = "web")]
+            (Ok(0), Self::WebSocket(socket)) => Err(socket.violated()),
+            (Ok(bytes), _) => Ok(bytes),
         })
     }
 
-    /// Whether a message is incomplete. For a stream, the reader checks its frames instead.
-    pub(super) fn is_unfinished(&self) -> bool {
+    /// Adds received bytes. Cut off all frames before the next push, so that memory stays bounded.
+    pub(super) fn push(&mut self, chunk: &[u8]) {
         match self {
-            Self::Plain(_) => false,
+            Self::Plain(_, frames) => frames.push(chunk),
             #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.is_unfinished(),
+            Self::WebSocket(socket) => socket.messages.push(chunk),
         }
     }
 
-    /// Whether a long message waits for its memory permit, so nothing is read. For a stream, the reader waits instead.
-    pub(super) fn waits_for_room(&self) -> bool {
+    /// Cuts off the next frame, if it is complete. Returns an error if none can follow.
+    pub(super) fn cut(&mut self) -> Result<Option<FramePart>, ClientLost> {
         match self {
-            Self::Plain(_) => false,
+            Self::Plain(_, frames) => Ok(frames.cut()),
             #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.waits_for_room(),
+            Self::WebSocket(socket) => socket.cut(),
+        }
+    }
+
+    /// Looks for the end of the client in `chunk`, which follows frames that wait. Returns an error if it has ended.
+    pub(super) fn look_ahead(&mut self, chunk: &mut BytesMut) -> Result<(), ClientLost> {
+        match self {
+            Self::Plain(..) => {
+                let _ = chunk;
+                Ok(())
+            }
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.look_ahead(chunk),
+        }
+    }
+
+    /// Bytes that [`look_ahead`](Self::look_ahead) has taken.
+    pub(super) fn taken_ahead(&self) -> usize {
+        match self {
+            Self::Plain(..) => 0,
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.messages.waiting(),
+        }
+    }
+
+    /// Whether a frame is incomplete.
+    pub(super) fn is_unfinished(&self) -> bool {
+        match self {
+            Self::Plain(_, frames) => frames.is_unfinished(),
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.messages.is_unfinished(),
+        }
+    }
+
+    /// Whether a frame is incomplete, and so long that it needs a memory permit.
+    pub(super) fn is_long_coming(&self) -> bool {
+        let buffered = match self {
+            Self::Plain(_, frames) => frames.buffered(),
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.messages.buffered(),
+        };
+        buffered > MEDIUM && self.is_unfinished()
+    }
+
+    /// Ends the stream. An incomplete frame is an error.
+    pub(super) fn finish(&mut self) -> Option<FrameError> {
+        match self {
+            Self::Plain(_, frames) => frames.finish(),
+            #[cfg(feature = "web")]
+            Self::WebSocket(_) => None,
         }
     }
 
     /// Abandons a frame that takes too long. Returns an error if the transport itself sends `why` to the client.
     pub(super) fn give_up(&mut self, why: &'static str) -> Result<(), ClientLost> {
         match self {
-            Self::Plain(_) => {
+            Self::Plain(..) => {
                 let _ = why;
                 Ok(())
             }
@@ -103,18 +140,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Reads from a refused client. The input is discarded.
-    pub(super) fn poll_swallow(
-        &mut self,
-        cx: &mut Context<'_>,
-        chunk: &mut BytesMut,
-    ) -> Poll<io::Result<usize>> {
-        match self {
-            Self::Plain(stream) => read_available(stream, cx, chunk),
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => read_available(socket.refused_stream(), cx, chunk),
-        }
-    }
+    // ---- sending ----------------------------------------------------------------------------------------------------
 
     /// Sends some of `frames`, in order. Returns the number of bytes. The next call begins with the rest of a frame.
     /// `frames` must stay the same until a call is ready.
@@ -124,7 +150,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         frames: impl ExactSizeIterator<Item = &'a Bytes>,
     ) -> Poll<io::Result<usize>> {
         match self {
-            Self::Plain(stream) => write_some(stream, cx, frames),
+            Self::Plain(stream, _) => write_some(stream, cx, frames),
             #[cfg(feature = "web")]
             Self::WebSocket(socket) => socket.poll_write(cx, frames),
         }
@@ -133,7 +159,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
     /// Sends the transport's own frames, such as answers to pings. Called when there is nothing else to send.
     pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         match self {
-            Self::Plain(_) => {
+            Self::Plain(..) => {
                 let _ = cx;
                 Poll::Ready(Ok(()))
             }
@@ -145,7 +171,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
     /// Time when the client last took a byte of the current write. `None` over TCP, where every write is short.
     pub(super) fn last_taken(&self) -> Option<Instant> {
         match self {
-            Self::Plain(_) => None,
+            Self::Plain(..) => None,
             #[cfg(feature = "web")]
             Self::WebSocket(socket) => socket.last_taken(),
         }
@@ -158,7 +184,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         is_refused: bool,
     ) -> Poll<io::Result<()>> {
         match self {
-            Self::Plain(stream) => {
+            Self::Plain(stream, _) => {
                 let _ = is_refused;
                 Pin::new(stream).poll_shutdown(cx)
             }
@@ -171,15 +197,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
 // ---- a plain stream -------------------------------------------------------------------------------------------------
 
 /// Appends at most [`READ_BYTES`] available bytes to `chunk`. Returns 0 at the end of the stream.
-fn read_available<S: AsyncRead + Unpin>(
-    stream: &mut S,
-    cx: &mut Context<'_>,
-    chunk: &mut BytesMut,
-) -> Poll<io::Result<usize>> {
-    pin!(read_some(stream, chunk)).poll(cx)
-}
-
-/// The same as [`read_available`], for a task of its own.
 pub(super) async fn read_some<S: AsyncRead + Unpin>(
     stream: &mut S,
     chunk: &mut BytesMut,

@@ -7,47 +7,12 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::actors::ConnectionId;
+use crate::protocol::op::Served;
 use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTED};
-
-/// The kinds of names that a client can serve.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Served {
-    Service,
-    Action,
-}
-
-impl Served {
-    /// The word for it.
-    pub(crate) const fn noun(self) -> &'static str {
-        match self {
-            Self::Service => "service",
-            Self::Action => "action",
-        }
-    }
-
-    /// The verb for its provider.
-    pub(crate) const fn verb(self) -> &'static str {
-        match self {
-            Self::Service => "provide",
-            Self::Action => "serve",
-        }
-    }
-
-    /// The word for a request to its provider.
-    pub(crate) const fn request(self) -> &'static str {
-        match self {
-            Self::Service => "call",
-            Self::Action => "goal",
-        }
-    }
-}
 
 /// The services and actions by their absolute names, each with its provider.
 #[derive(Default)]
-pub(crate) struct Directory {
-    services: BTreeMap<Arc<str>, Provider>,
-    actions: BTreeMap<Arc<str>, Provider>,
-}
+pub(crate) struct Directory(BTreeMap<(Served, Arc<str>), Provider>);
 
 /// The client that serves a service or an action.
 #[derive(Clone)]
@@ -59,13 +24,6 @@ pub(crate) struct Provider {
 }
 
 impl Directory {
-    fn served(&mut self, kind: Served) -> &mut BTreeMap<Arc<str>, Provider> {
-        match kind {
-            Served::Service => &mut self.services,
-            Served::Action => &mut self.actions,
-        }
-    }
-
     /// Makes a client the provider of `name`. The newest registration wins. Returns the previous provider.
     pub(crate) fn provide(
         &mut self,
@@ -79,15 +37,12 @@ impl Directory {
             spelling: spelling.into(),
             type_name: type_name.map(Into::into),
         };
-        let before = self.served(kind).insert(name.into(), provider)?;
+        let before = self.0.insert((kind, name.into()), provider)?;
         Some(before.connection)
     }
 
     pub(crate) fn provider(&self, kind: Served, name: &str) -> Option<&Provider> {
-        match kind {
-            Served::Service => self.services.get(name),
-            Served::Action => self.actions.get(name),
-        }
+        self.0.get(&(kind, name.into()))
     }
 
     /// Withdraws a name if `connection` is its provider. Returns whether it was.
@@ -95,16 +50,17 @@ impl Directory {
         let is_ours = |one: &Provider| one.connection == connection;
         let is_served = self.provider(kind, name).is_some_and(is_ours);
         if is_served {
-            self.served(kind).remove(name);
+            self.0.remove(&(kind, name.into()));
         }
         is_served
     }
 
     /// Lists the topics, services and actions, up to the limit of each list.
     pub(crate) fn census(&self, topics: impl Iterator<Item = ListedTopic>) -> Census {
-        let listed = |all: &BTreeMap<Arc<str>, Provider>| {
-            let all = all.iter().take(MAX_LISTED);
-            let all = all.map(|(name, one)| ListedService {
+        let listed = |kind| {
+            let all = self.0.range((kind, Arc::from(""))..).take(MAX_LISTED);
+            let all = all.take_while(|((one, _), _)| *one == kind);
+            let all = all.map(|((_, name), one)| ListedService {
                 name: Arc::clone(name),
                 type_name: one.type_name.clone(),
             });
@@ -112,8 +68,8 @@ impl Directory {
         };
         Census {
             topics: topics.take(MAX_LISTED).collect(),
-            services: listed(&self.services),
-            actions: listed(&self.actions),
+            services: listed(Served::Service),
+            actions: listed(Served::Action),
         }
     }
 }

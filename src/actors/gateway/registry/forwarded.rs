@@ -7,10 +7,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tokio::time::Instant;
 
-use super::directory::Served;
 use super::kept::KeptEntry;
 use crate::actors::ConnectionId;
 use crate::protocol::names::{self, OWN_ID_PREFIX};
+use crate::protocol::op::Served;
 use crate::protocol::wire::json::Payload;
 
 /// Longest spelling of a request's id in JSON: prefix, twenty digits, quotes, each character escaped as `\u0070`.

@@ -27,7 +27,7 @@ use bytes::Bytes;
 use tokio::sync::oneshot;
 use tokio::time::{Instant, sleep_until};
 
-use self::directory::{Directory, Served};
+use self::directory::Directory;
 use self::forwarded::Requests;
 use self::kept::{Kept, KeptEntry};
 use self::places::Places;
@@ -38,14 +38,14 @@ use super::messages::{
     Retire, SetTap, TakeCensus, Tap, Tapped, ToClient,
 };
 use crate::actors::ConnectionId;
-use crate::actors::node::{Barrier, Interest, Respond};
+use crate::actors::node::{Barrier, FrameKind, Interest, Respond};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::{Permit, cover};
 pub use crate::actors::wire::Nodes;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, ErrorForm, Level};
 use crate::protocol::names;
-use crate::protocol::op::{ActionServerOp, Op, Verbosity};
+use crate::protocol::op::{Op, ProviderOp, Served, Verbosity};
 use crate::protocol::wire::json::Payload;
 
 /// Calls and goals ended per cleanup, which takes a third of a millisecond.
@@ -113,8 +113,7 @@ struct Registrations {
     advertised: BTreeMap<Box<str>, KeptEntry>,
     /// Topics of its subscriptions, in its own spelling.
     subscribed: BTreeSet<Arc<str>>,
-    services: BTreeMap<Box<str>, KeptEntry>,
-    actions: BTreeMap<Box<str>, KeptEntry>,
+    served: BTreeMap<(Served, Box<str>), KeptEntry>,
 }
 
 /// The sender of the frame that is being performed, and the frame's `id`.
@@ -187,15 +186,6 @@ impl Client {
     /// Bytes of responses that wait to be written to it.
     fn backlog(&self) -> usize {
         self.outlets.backlog.load(Ordering::Relaxed)
-    }
-}
-
-impl Registrations {
-    fn served(&mut self, kind: Served) -> &mut BTreeMap<Box<str>, KeptEntry> {
-        match kind {
-            Served::Service => &mut self.services,
-            Served::Action => &mut self.actions,
-        }
     }
 }
 
@@ -315,20 +305,24 @@ impl Handler<Respond> for Registry {
     type Result = ();
 
     fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
-        if let Some(client) = self.clients.get(&respond.connection)
-            && respond
-                .status
-                .is_none_or(|level| client.verbosity.wants(level))
-        {
-            let frame = (respond.frame)();
-            if let (Some(tap), Some(service)) = (&mut self.tap, respond.service) {
-                tap(Tapped::Answered {
-                    to: respond.connection,
-                    service,
-                    frame: &frame,
-                });
+        let Some(client) = self.clients.get(&respond.connection) else {
+            return;
+        };
+        match respond.kind {
+            FrameKind::Status(level) if !client.verbosity.wants(level) => {}
+            FrameKind::Status(_) | FrameKind::End => client.send((respond.frame)()),
+            FrameKind::Feedback => client.deliver_feedback((respond.frame)()),
+            FrameKind::Answer(service) => {
+                let frame = (respond.frame)();
+                if let Some(tap) = &mut self.tap {
+                    tap(Tapped::Answered {
+                        to: respond.connection,
+                        service,
+                        frame: &frame,
+                    });
+                }
+                client.respond(frame, Some(service));
             }
-            client.respond(frame, respond.service);
         }
     }
 }
@@ -427,7 +421,15 @@ impl Registry {
                 }
                 Ok(())
             }
-            op => self.perform_as_provider(&origin, op),
+            Op::Serve { kind, name, op } => self.perform_as_provider(&origin, kind, &name, op),
+            Op::BadAnswer {
+                kind,
+                name,
+                problem,
+            } => self.fail_answered(&origin, kind, name.as_deref(), problem),
+            // The connection has already joined the pieces and checked the token. If no token is required, any token is
+            // accepted.
+            Op::Fragment(_) | Op::Auth { .. } => Ok(()),
         };
         if let Err(why) = refusal {
             self.refuse(&origin, &why);
@@ -435,55 +437,37 @@ impl Registry {
         Handled::at_once()
     }
 
-    /// Performs an op of a provider: it advertises a service or an action, or answers a request.
-    fn perform_as_provider(&mut self, origin: &FrameOrigin, op: Op) -> Result<(), Refusal> {
+    /// Performs an op of a client that serves `name`.
+    fn perform_as_provider(
+        &mut self,
+        origin: &FrameOrigin,
+        kind: Served,
+        name: &str,
+        op: ProviderOp,
+    ) -> Result<(), Refusal> {
         match op {
-            Op::AdvertiseService { service, type_name } => {
-                self.serve(origin, Served::Service, &service, type_name.as_deref())
+            ProviderOp::Advertise { type_name } => {
+                self.serve(origin, kind, name, type_name.as_deref())
             }
-            Op::UnadvertiseService { service } => {
-                self.stop_serving(origin, Served::Service, &service)
-            }
-            Op::ServeAction { action, op } => match op {
-                ActionServerOp::Advertise { type_name } => {
-                    self.serve(origin, Served::Action, &action, type_name.as_deref())
-                }
-                ActionServerOp::Unadvertise => self.stop_serving(origin, Served::Action, &action),
-                ActionServerOp::Feedback { values } => self.pass_feedback(origin, &action, &values),
-                ActionServerOp::End {
-                    values,
-                    status,
-                    result,
-                } => self.complete(origin, Served::Action, &action, |name, id| {
-                    messages::action_result(name, id, &values, status, result)
-                }),
-            },
-            Op::ServiceResponse {
-                service,
+            ProviderOp::Unadvertise => self.stop_serving(origin, kind, name),
+            ProviderOp::Feedback { values } => self.pass_feedback(origin, name, &values),
+            ProviderOp::End {
+                values,
+                status,
+                result,
+            } => self.complete(origin, kind, name, |name, id| {
+                messages::action_result(name, id, &values, status, result)
+            }),
+            ProviderOp::Respond {
                 values,
                 result,
                 status,
             } => {
                 let status = status.unwrap_or_default();
-                self.complete(origin, Served::Service, &service, |service, id| {
-                    messages::response(service, id, &values, result, &status)
+                self.complete(origin, kind, name, |name, id| {
+                    messages::response(name, id, &values, result, &status)
                 })
             }
-            Op::BadAnswer {
-                of_goal,
-                name,
-                problem,
-            } => {
-                let kind = if of_goal {
-                    Served::Action
-                } else {
-                    Served::Service
-                };
-                self.fail_answered(origin, kind, name.as_deref(), problem)
-            }
-            // The connection has already joined the pieces and checked the token. If no token is required, any token is
-            // accepted.
-            _ => Ok(()),
         }
     }
 
@@ -551,11 +535,8 @@ impl Registry {
         for topic in &registered.subscribed {
             self.drop_subscriber(topic, id);
         }
-        for service in registered.services.keys() {
-            self.directory.withdraw(Served::Service, service, id);
-        }
-        for action in registered.actions.keys() {
-            self.directory.withdraw(Served::Action, action, id);
+        for (kind, name) in registered.served.keys() {
+            self.directory.withdraw(*kind, name, id);
         }
         if self.requests.waiting_for(id).is_some() {
             self.gone.push_back(id);

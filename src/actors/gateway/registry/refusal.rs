@@ -2,9 +2,8 @@
 //!
 //! **Invariant:** every sentence begins with its field, or names the service.
 
-use super::directory::Served;
 use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_BACKLOG, MAX_KEPT};
-use crate::protocol::op::Problem;
+use crate::protocol::op::{Problem, Served};
 use crate::services::NoService;
 
 /// An op or a call that changed nothing.
@@ -23,11 +22,11 @@ pub(crate) enum Refusal {
     UnknownType,
     #[error("id: a subscription's id has at most {0} bytes")]
     LongSubscriptionId(usize),
-    #[error("{noun}: {1} is {verb}d by the runtime itself", noun = .0.noun(), verb = .0.verb())]
+    #[error("{noun}: {1} is {verb}d by the runtime itself", noun = .0.noun(), verb = verb(*.0))]
     OfRuntime(Served, String),
-    #[error("{noun}: this connection does not {verb} {1}", noun = .0.noun(), verb = .0.verb())]
+    #[error("{noun}: this connection does not {verb} {1}", noun = .0.noun(), verb = verb(*.0))]
     NotServed(Served, String),
-    #[error("{noun}: the {request} with this id belongs to {1}", noun = .0.noun(), request = .0.request())]
+    #[error("{noun}: the {request} with this id belongs to {1}", noun = .0.noun(), request = request(*.0))]
     OfAnother(Served, String),
     #[error("id: no call of {0} with this id waits for this connection")]
     StaleCall(String),
@@ -59,4 +58,20 @@ pub(crate) enum Refusal {
     ActionType(&'static str),
     #[error("{0}")]
     Closed(&'static str),
+}
+
+/// The verb for the provider.
+const fn verb(kind: Served) -> &'static str {
+    match kind {
+        Served::Service => "provide",
+        Served::Action => "serve",
+    }
+}
+
+/// The word for a request to the provider.
+const fn request(kind: Served) -> &'static str {
+    match kind {
+        Served::Service => "call",
+        Served::Action => "goal",
+    }
 }

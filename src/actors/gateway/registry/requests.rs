@@ -8,22 +8,21 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::directory::Served;
 use super::forwarded::{Forwarded, RequestTerms};
 use super::refusal::Refusal;
 use super::{FrameOrigin, Registry};
 use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
 use crate::actors::gateway::messages::{Handled, Tapped};
-use crate::actors::node::{Feedback, guard};
+use crate::actors::node::guard;
 use crate::actors::resources::memory::cover_message;
 use crate::actors::wire::action_client::{
-    ActionClient, ActionRequest, CancelSent, Canceller, ForwardGoal, SentGoal,
+    ActionClient, ActionRequest, CancelSent, ForwardGoal, SentGoal,
 };
 use crate::actors::wire::{Caller, Route, ServiceCall};
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
-use crate::protocol::op::{ActionGoal, Arguments, CallService, GoalStatus, Problem};
+use crate::protocol::op::{ActionGoal, Arguments, CallService, GoalStatus, Problem, Served};
 use crate::protocol::wire::json::Payload;
 use crate::services::{Address, NoService};
 
@@ -129,7 +128,6 @@ impl Registry {
         };
         let action_client = ActionClient {
             respond: ctx.address().recipient(),
-            feedback: ctx.address().recipient(),
             connection: origin.from,
             action: Arc::from(goal.action.as_str()),
             id: origin.id,
@@ -179,25 +177,15 @@ impl Registry {
             return Handled::at_once();
         };
         let (done, ended) = guard();
-        let from = Canceller {
-            respond: ctx.address().recipient(),
+        node(ActionRequest::Cancel(CancelSent {
             goal: SentGoal {
                 connection: origin.from,
                 id: origin.id,
             },
-        };
-        node(ActionRequest::Cancel(CancelSent { from, done }));
+            respond: ctx.address().recipient(),
+            done,
+        }));
         Handled::with(ended)
-    }
-}
-
-impl Handler<Feedback> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, feedback: Feedback, _: &mut Context<Self>) {
-        if let Some(client) = self.clients.get(&feedback.connection) {
-            client.deliver_feedback((feedback.frame)());
-        }
     }
 }
 
@@ -224,15 +212,15 @@ impl Registry {
             return Ok(());
         };
         let bytes = spelling.len() + type_name.map_or(0, str::len);
-        let served = client.registered.served(kind);
-        let entry = client.kept.enter(bytes, served.get(name))?;
-        served.insert(name.into(), entry);
+        let (key, served) = ((kind, name.into()), &mut client.registered.served);
+        let entry = client.kept.enter(bytes, served.get(&key))?;
+        served.insert(key, entry);
         let provider = (origin.from, spelling);
         let before = self.directory.provide(kind, name, provider, type_name);
         if let Some(before) = before.filter(|one| *one != origin.from)
             && let Some(before) = self.clients.get_mut(&before)
         {
-            before.registered.served(kind).remove(name);
+            before.registered.served.remove(&(kind, name.into()));
         }
         let msg = format!("advertised {} {spelling}", kind.noun());
         self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
@@ -251,7 +239,7 @@ impl Registry {
             return Err(Refusal::NotServed(kind, spelling.to_owned()));
         }
         if let Some(client) = self.clients.get_mut(&origin.from) {
-            client.registered.served(kind).remove(name);
+            client.registered.served.remove(&(kind, name.into()));
         }
         Ok(())
     }

@@ -177,7 +177,7 @@ impl<const N: usize> Handler<CancelSent> for TfRepublisher<N> {
 
     fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
         let is_meant = |subscription: &SubscribeFrames<N>| match &subscription.by {
-            FrameReceiver::Client(client) => client.is(&cancel.from.goal),
+            FrameReceiver::Client(client) => client.is(&cancel.goal),
             FrameReceiver::Topic { .. } => false,
         };
         let at = self
@@ -186,7 +186,7 @@ impl<const N: usize> Handler<CancelSent> for TfRepublisher<N> {
             .position(|(subscription, _)| is_meant(subscription));
         match at.and_then(|at| self.subscriptions.remove(at)) {
             Some((subscription, _)) => subscription.end(GoalStatus::Canceled, Empty {}),
-            None => cancel.from.refuse(NOT_KEPT),
+            None => cancel.refuse(NOT_KEPT),
         }
         self.keep_timer(ctx);
     }
