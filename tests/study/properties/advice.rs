@@ -79,25 +79,43 @@ fn a_settling_loop_does_not_diverge_at_the_advised_timestep<const N: usize>(
     }
     let small = timestep.min(0.01) / 8.0;
     let duration = (small * MOST_STEPS).min(20.0);
-    let ends = |method: Method, timestep: f64| {
+    // The largest speed in the last tenth. A swing that turns back is slow for an instant only.
+    let ends = |method: Method, timestep: f64, duration: f64| {
         let control = control.with_method(method).with_timestep(timestep);
         let mut live = control.simulation(start);
-        let steps = (duration / timestep).ceil() as u64;
-        let whole = live.advance(steps) == steps;
-        let velocity = live.state().velocity.iter().map(|v| v.abs());
-        let speed = velocity.fold(0.0, f64::max);
-        if whole { speed } else { f64::INFINITY }
+        let part = (duration / timestep / 100.0).ceil() as u64;
+        let mut speed = 0.0_f64;
+        for k in 0..100 {
+            if live.advance(part) < part {
+                return f64::INFINITY;
+            }
+            if k >= 90 {
+                let velocity = live.state().velocity;
+                speed = velocity.iter().fold(speed, |most, v| most.max(v.abs()));
+            }
+        }
+        speed
     };
-    if ends(Method::Rk4, small) > 0.01 {
+    if ends(Method::Rk4, small, duration) > 0.01 {
         tally.open += 1;
         return;
     }
     tally.tried += 1;
-    let speed = ends(method, timestep);
+    // The method may damp the motion less.
+    let speed = ends(method, timestep, 3.0 * duration);
     if speed > 1.0 {
         println!("case {case}: {speed} rad/s at {timestep} s: {control:?} {start:?}");
         tally.outside += 1;
     }
+}
+
+/// The advice must count the energy of the whole move, and a link that spins.
+#[test]
+fn known_motions_do_not_diverge_at_the_advised_timestep() {
+    let mut tally = Tally::default();
+    a_settling_loop_does_not_diverge_at_the_advised_timestep::<2>(3_005_320, &mut tally);
+    a_settling_loop_does_not_diverge_at_the_advised_timestep::<2>(3_008_016, &mut tally);
+    assert_eq!((tally.tried, tally.outside), (2, 0), "{tally:?}");
 }
 
 #[test]
