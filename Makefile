@@ -30,13 +30,20 @@ page: ## Write pendularm.html (or OUT=), the page in one file without a server; 
 	@echo "make page: $(or $(OUT),pendularm.html)"
 	@CARGO="$(CARGO)" bash scripts/page.sh "$(or $(OUT),pendularm.html)"
 
-# Tests of the wire wait more than they compute, so four times as many run as there are processors. The library's own
-# tests compute little, so they are built without optimising, in a sixth of the time. `cargo test` runs the same tests.
+# Tests of the wire and of conformance wait more than they compute, so they run beside the others, and four times as many
+# threads as there are processors. The library's own tests compute little, so they are built without optimising, in a
+# sixth of the time. One run needs no data for the next build, which would cost a seventh of the time. `cargo test` runs
+# the same tests.
+WAITING := $(TARGET_DIR)/waiting-tests.txt
 test: export RUST_TEST_THREADS := $(or $(RUST_TEST_THREADS),$(shell echo $$((4 * $$(getconf _NPROCESSORS_ONLN)))))
+test: export CARGO_INCREMENTAL := 0
 test: ## Run every test that needs only Rust, except slow ones
 	@echo "make test: unit, property, wire and documentation tests"
 	$(CARGO) --config profile.dev.package.pendularm.opt-level=0 test --locked --lib
-	$(CARGO) test --locked --test '*'
+	$(CARGO) test --locked --test '*' --no-run
+	@$(CARGO) test --locked --test wire --test conformance > "$(WAITING)" 2>&1 & waiting=$$!; \
+	$(CARGO) test --locked --test '[!cw]*'; computed=$$?; \
+	wait $$waiting; waited=$$?; cat "$(WAITING)"; [ $$computed = 0 ] && [ $$waited = 0 ]
 	$(CARGO) test --locked --doc
 
 conformance: ## Test any server of the protocol against the specification's rules: ADDR=127.0.0.1:9095; ARGS="--category pid" or "--rule reset"

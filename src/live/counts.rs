@@ -22,7 +22,7 @@ pub(crate) struct Telemetry {
     pub(crate) energy_reference: f64,
     pub(crate) window: Window,
     /// Wall time by which the arm was late after the latest wake-up \[s\].
-    owed: f64,
+    pub(crate) owed: f64,
     /// Rates over the previous window, for a message early in the present one.
     pub(crate) last_rates: Rates,
 }
@@ -91,11 +91,6 @@ impl Telemetry {
         if took > self.window.longest.took {
             self.window.longest = WakeUp { steps, took };
         }
-    }
-
-    /// Records the number of steps due after a wake-up.
-    pub(crate) fn note_backlog(&mut self, steps: u64, timestep: f64) {
-        self.owed = in_f64(steps) * timestep;
     }
 
     /// Whether the arm is so late that it will soon drop steps, or drops them already.

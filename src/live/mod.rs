@@ -155,7 +155,8 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         if self.catching_up {
             return false;
         }
-        let due = self.pacer.due(self.world.now());
+        let now = self.world.now();
+        let due = self.pacer.due(now);
         if due == 0 {
             return false;
         }
@@ -165,9 +166,9 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             self.note_divergence();
             return false;
         }
-        self.telemetry
-            .note_backlog(due - taken, self.simulation.timestep());
         self.catching_up = taken < due;
+        let owed = self.catching_up.then(|| self.pacer.behind(now));
+        self.telemetry.owed = owed.unwrap_or_default();
         self.catching_up
     }
 
@@ -203,7 +204,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         if let Some(journal) = &mut self.journal {
             journal.diverge(&self.simulation);
         }
-        self.telemetry.note_backlog(0, 0.0);
+        self.telemetry.owed = 0.0;
         if let Some(divergence) = self.simulation.divergence() {
             self.world.note_divergence(divergence);
         }
@@ -212,7 +213,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
 
     /// Time counts from here. The fraction of an unfinished step is dropped.
     pub(crate) fn restart_pacer(&mut self) {
-        self.telemetry.note_backlog(0, 0.0);
+        self.telemetry.owed = 0.0;
         self.pacer
             .restart(self.world.now(), self.simulation.timestep());
     }

@@ -86,6 +86,16 @@ impl Pacer {
         self.taken = self.taken.saturating_add(steps);
     }
 
+    /// Wall time since the last step taken was due \[s\].
+    #[must_use]
+    #[allow(
+        clippy::cast_precision_loss,
+        reason = "a count of more than 2^53 steps is rounded"
+    )]
+    pub fn behind(&self, now: Duration) -> f64 {
+        now.saturating_sub(self.anchor).as_secs_f64() - self.taken as f64 * self.timestep
+    }
+
     fn owed(&self, now: Duration) -> u64 {
         self.whole_steps(now.saturating_sub(self.anchor))
             .saturating_sub(self.taken)

@@ -180,11 +180,7 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         advised: None,
         period: control.given_period(),
     };
-    let part = if runaway.is_some() {
-        SPINNING_PART
-    } else {
-        ADVISED_PART
-    };
+    let part = runaway.map_or(ADVISED_PART, |_| SPINNING_PART);
     limits.advised = limits.trusted().map(|limit| part * limit);
     if let Some(pose) = runaway {
         (least, worst) = (Some(0.0), pose);

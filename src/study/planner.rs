@@ -258,14 +258,9 @@ impl<const N: usize> Reference<N> {
 
     /// Largest error of a run of `steps` steps per whole \[m\]. The run ends once the error exceeds `allowed`.
     async fn off_by(&self, run: Box<dyn Steppable<N>>, steps: u64, allowed: f64) -> f64 {
-        let arm = &self.task.control.arm;
-        largest_distance(
-            arm,
-            (run, steps * self.count),
-            self.motion(steps, 0),
-            allowed,
-        )
-        .await
+        let (arm, steps_of_run) = (&self.task.control.arm, steps * self.count);
+        let reference = self.motion(steps, 0);
+        largest_distance(arm, (run, steps_of_run), reference, allowed).await
     }
 
     /// A motion from its start, and the number of its steps per step of a run with `steps` steps per whole. Motions known

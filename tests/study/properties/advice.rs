@@ -101,9 +101,9 @@ fn a_settling_loop_does_not_diverge_at_the_advised_timestep<const N: usize>(
         return;
     }
     tally.tried += 1;
-    // The method may damp the motion less.
+    // The method may damp the motion less, so it may still be slowing down.
     let speed = ends(method, timestep, 3.0 * duration);
-    if speed > 1.0 {
+    if speed > 1.0 && speed > 0.9 * ends(method, timestep, duration) {
         println!("case {case}: {speed} rad/s at {timestep} s: {control:?} {start:?}");
         tally.outside += 1;
     }
@@ -115,7 +115,8 @@ fn known_motions_do_not_diverge_at_the_advised_timestep() {
     let mut tally = Tally::default();
     a_settling_loop_does_not_diverge_at_the_advised_timestep::<2>(3_005_320, &mut tally);
     a_settling_loop_does_not_diverge_at_the_advised_timestep::<2>(3_008_016, &mut tally);
-    assert_eq!((tally.tried, tally.outside), (2, 0), "{tally:?}");
+    a_settling_loop_does_not_diverge_at_the_advised_timestep::<2>(4_106_218, &mut tally);
+    assert_eq!((tally.tried, tally.outside), (3, 0), "{tally:?}");
 }
 
 #[test]

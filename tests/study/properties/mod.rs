@@ -1,7 +1,7 @@
 //! Claims of every answer of the study, tried on random arms, gains, poses and setpoints.
 //!
 //! A case is made from its number alone, which a failure names: `FROM=number COUNT=1` makes it again.
-//! `make check-study` runs as many as `COUNT` says, in an optimised build; the tests here run hundreds.
+//! `make check-study` runs as many as `COUNT` says, in an optimised build; the tests here run dozens of each.
 
 mod advice;
 mod gains;

@@ -93,12 +93,12 @@ fn an_uncertainty_holds_the_true_error<const N: usize>(case: u64, tally: &mut Ta
 
 #[test]
 fn plans_for_random_arms_keep_their_error() {
-    tells(property!(a_plan_keeps_its_error, 30, 10_000));
+    tells(property!(a_plan_keeps_its_error, 12, 10_000));
 }
 
 #[test]
 fn uncertainties_of_random_rollouts_hold_the_true_error() {
-    let tally = property!(an_uncertainty_holds_the_true_error, 100, 1_000_000);
+    let tally = property!(an_uncertainty_holds_the_true_error, 40, 1_000_000);
     assert!(tally.outside <= tally.tried / 100, "{tally:?}");
     tells(tally);
 }
