@@ -26,8 +26,9 @@
 //! 4. A strong joint then throws the links behind a weak one again and again, up to five times the sum of the peaks.
 //!
 //! The limits were measured on 2,100 random arms of 2 and 3 links, spun or falling for 4 s. Two in a hundred diverged
-//! slightly below these angles, and half of them were stable at 2.5 times as much. On moves of up to 25 rad per joint,
-//! with all degrees of damping, the assumed speed was 0.5 to 2.9 times the true one.
+//! slightly below these angles, and half of them were stable at 2.5 times as much. On 2,078 moves of up to 25
+//! rad per joint, with all degrees of damping, the assumed speed was 0.55 to 4.7 times the true one in 98 of 100, and
+//! 0.35 to 11.2 times in all.
 //!
 //! **Invariant:** pure and cheap, some 3 µs, since it is computed for every published tick.
 //!
