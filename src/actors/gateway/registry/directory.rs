@@ -10,9 +10,9 @@ use crate::actors::ConnectionId;
 use crate::protocol::op::Served;
 use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTED};
 
-/// The services and actions by their absolute names, each with its provider.
+/// The services and the actions by their absolute names, each with its provider.
 #[derive(Default)]
-pub(crate) struct Directory(BTreeMap<(Served, Arc<str>), Provider>);
+pub(crate) struct Directory(BTreeMap<Served, BTreeMap<Arc<str>, Provider>>);
 
 /// The client that serves a service or an action.
 #[derive(Clone)]
@@ -37,20 +37,21 @@ impl Directory {
             spelling: spelling.into(),
             type_name: type_name.map(Into::into),
         };
-        let before = self.0.insert((kind, name.into()), provider)?;
+        let served = self.0.entry(kind).or_default();
+        let before = served.insert(name.into(), provider)?;
         Some(before.connection)
     }
 
     pub(crate) fn provider(&self, kind: Served, name: &str) -> Option<&Provider> {
-        self.0.get(&(kind, name.into()))
+        self.0.get(&kind)?.get(name)
     }
 
     /// Withdraws a name if `connection` is its provider. Returns whether it was.
     pub(crate) fn withdraw(&mut self, kind: Served, name: &str, connection: ConnectionId) -> bool {
         let is_ours = |one: &Provider| one.connection == connection;
         let is_served = self.provider(kind, name).is_some_and(is_ours);
-        if is_served {
-            self.0.remove(&(kind, name.into()));
+        if is_served && let Some(served) = self.0.get_mut(&kind) {
+            served.remove(name);
         }
         is_served
     }
@@ -58,9 +59,8 @@ impl Directory {
     /// Lists the topics, services and actions, up to the limit of each list.
     pub(crate) fn census(&self, topics: impl Iterator<Item = ListedTopic>) -> Census {
         let listed = |kind| {
-            let all = self.0.range((kind, Arc::from(""))..).take(MAX_LISTED);
-            let all = all.take_while(|((one, _), _)| *one == kind);
-            let all = all.map(|((_, name), one)| ListedService {
+            let all = self.0.get(&kind).into_iter().flatten().take(MAX_LISTED);
+            let all = all.map(|(name, one)| ListedService {
                 name: Arc::clone(name),
                 type_name: one.type_name.clone(),
             });
