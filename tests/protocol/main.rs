@@ -14,4 +14,5 @@ mod scene;
 mod series;
 mod trajectory;
 mod tree;
+#[cfg(feature = "web")]
 mod websocket;

@@ -8,4 +8,5 @@ pub mod json;
 pub mod opening;
 pub mod series;
 pub(crate) mod text;
+#[cfg(feature = "web")]
 pub mod websocket;
