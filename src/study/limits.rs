@@ -101,8 +101,7 @@ impl<const N: usize> Limits<N> {
     /// The advised timestep for a motion \[s\]: [`ADVISED_PART`] of the limit of poses and motion. `None` if there is no
     /// limit, or if the control period is longer: the limits over all poses are those of a law that runs in every step.
     pub fn advised_for(&self, motion: &Motion) -> Option<f64> {
-        let carried = ADVISED_PART * motion.timestep;
-        let carried = Some(carried).filter(|timestep| timestep.is_finite());
+        let carried = Some(ADVISED_PART * motion.timestep).filter(|it| it.is_finite());
         let both = [self.advised, carried].into_iter().flatten();
         both.reduce(f64::min)
             .filter(|timestep| self.period <= *timestep)
