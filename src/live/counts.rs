@@ -22,7 +22,7 @@ pub(crate) struct Telemetry {
     pub(crate) energy_reference: f64,
     pub(crate) window: Window,
     /// Wall time by which the arm was late after the latest wake-up \[s\].
-    pub(crate) owed: f64,
+    pub(crate) behind: f64,
     /// Rates over the previous window, for a message early in the present one.
     pub(crate) last_rates: Rates,
 }
@@ -65,7 +65,7 @@ impl Telemetry {
             ticks: 0,
             energy_reference: energy(simulation),
             window: Window::new(now),
-            owed: 0.0,
+            behind: 0.0,
             last_rates: Rates::default(),
         }
     }
@@ -95,7 +95,7 @@ impl Telemetry {
 
     /// Whether the arm is so late that it will soon drop steps, or drops them already.
     pub(crate) fn lags(&self) -> bool {
-        self.owed > CATCH_UP.as_secs_f64() / 2.0
+        self.behind > CATCH_UP.as_secs_f64() / 2.0
     }
 }
 

@@ -167,8 +167,8 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             return false;
         }
         self.catching_up = taken < due;
-        let owed = self.catching_up.then(|| self.pacer.behind(now));
-        self.telemetry.owed = owed.unwrap_or_default();
+        let behind = self.catching_up.then(|| self.pacer.behind(now));
+        self.telemetry.behind = behind.unwrap_or_default();
         self.catching_up
     }
 
@@ -204,7 +204,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         if let Some(journal) = &mut self.journal {
             journal.diverge(&self.simulation);
         }
-        self.telemetry.owed = 0.0;
+        self.telemetry.behind = 0.0;
         if let Some(divergence) = self.simulation.divergence() {
             self.world.note_divergence(divergence);
         }
@@ -213,7 +213,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
 
     /// Time counts from here. The fraction of an unfinished step is dropped.
     pub(crate) fn restart_pacer(&mut self) {
-        self.telemetry.owed = 0.0;
+        self.telemetry.behind = 0.0;
         self.pacer
             .restart(self.world.now(), self.simulation.timestep());
     }

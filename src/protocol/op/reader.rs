@@ -371,7 +371,7 @@ fn duration(seconds: f64, longest: Duration) -> Duration {
     Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
 }
 
-// ---- actions: goals and cancellations from those who send them, the rest from clients that serve ------------------------
+// ---- goals and cancellations, and the ops of clients that serve -----------------------------------------------------
 
 impl OpReader<'_> {
     /// A goal. Once its action is known, every other fault gets an `action_result`.

@@ -434,9 +434,9 @@ impl ClientReader {
         }
     }
 
-    /// Waits until something was written or computed. Meanwhile reads up to [`READ_BYTES`] bytes, to detect the end of the
-    /// stream. Returns an error if the client has disconnected. A client that has
-    /// ended its stream counts as disconnected if nothing was written or computed for [`RESPONSES_TIME`].
+    /// Waits until something was written or computed. Meanwhile reads up to [`READ_BYTES`] bytes, to detect the end of
+    /// the stream. Returns an error if the client has disconnected. A client that has ended its stream counts as
+    /// disconnected if nothing was written or computed for [`RESPONSES_TIME`].
     fn poll_ahead<S: AsyncRead + AsyncWrite + Unpin>(
         &mut self,
         connection: &mut Connection<S>,
