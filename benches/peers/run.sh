@@ -85,7 +85,7 @@ cd "$folder"
     environment "make bench-peers"
     echo "compilers: $("$cc" --version | head -n 1); $("$cxx" --version | head -n 1)"
     echo "peers:     $(sed -n '/^libpinocchio\|^cmeel-eigen\|^cmeel-cppad\|^mujoco/p' "$here/requirements.txt" | paste -sd ' ')"
-    echo "flags:     wheel, generated plain: -O3; native, mujoco: -O3 -march=native; generated fast: -Ofast -march=native; the wheels' libraries as they come"
+    echo "flags:     pendularm: one codegen unit; wheel, generated plain: -O3; native, mujoco: -O3 -march=native; generated fast: -Ofast -march=native; the wheels' libraries as they come"
     echo "passes:    $passes, one pinned core, every program in turn"
 } >environment.txt
 

@@ -205,6 +205,7 @@ impl<const N: usize> State<N> {
 
     /// The state after a step with these increments.
     #[must_use]
+    #[inline(always)]
     #[allow(
         clippy::indexing_slicing,
         reason = "every index comes from `array::from_fn` over arrays of the same constant length"

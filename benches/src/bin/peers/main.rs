@@ -269,12 +269,18 @@ fn time<const N: usize>(path: &str) {
         state
     });
     // With its method written into the loop, as in the peers' programs.
-    time_steps(&cases, "euler", |effort, state| {
-        step(&arm, Method::Euler, effort, state, h);
-    });
-    time_steps(&cases, "rk4", |effort, state| {
-        step(&arm, Method::Rk4, effort, state, h);
-    });
+    time_steps(
+        &cases,
+        "euler",
+        #[inline(always)]
+        |effort, state| step(&arm, Method::Euler, effort, state, h),
+    );
+    time_steps(
+        &cases,
+        "rk4",
+        #[inline(always)]
+        |effort, state| step(&arm, Method::Rk4, effort, state, h),
+    );
     for method in [Method::Euler, Method::Rk4] {
         measure::<N, _>(&format!("{method} step, live"), || {
             let mut simulation = Simulation::new(arm, gains());
