@@ -109,13 +109,18 @@ fn a_settling_loop_does_not_diverge_at_the_advised_timestep<const N: usize>(
     if speed < 1.0 || speed < 0.9 * ends(method, timestep, duration, &start) {
         return;
     }
-    // A loop with integrals can have a swing that lasts beside its rest. Then a small difference decides.
+    // It may rest for a while where it cannot stay, or a loop with integrals can have a swing that lasts beside its
+    // rest. Then a small difference decides.
     let mut nearby = (0..NEARBY).map(|_| State {
         position: start.position.map(|q| q + 0.01 * dice.any()),
         velocity: start.velocity.map(|v| v * (1.0 + 0.01 * dice.any())),
     });
-    let swings = |start| (0.01..100.0).contains(&ends(Method::Rk4, small, duration, &start));
-    if speed.is_finite() && nearby.any(swings) {
+    let swings = |duration: f64, start: &State<N>| {
+        (0.01..100.0).contains(&ends(Method::Rk4, small, duration, start))
+    };
+    if speed.is_finite()
+        && (swings(3.0 * duration, &start) || nearby.any(|start| swings(duration, &start)))
+    {
         tally.tried -= 1;
         tally.open += 1;
         return;
