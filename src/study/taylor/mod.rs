@@ -109,6 +109,8 @@ pub(crate) struct Taylor<T, const N: usize> {
     tolerance: f64,
     /// Order of the series, except at the end of a span.
     order: usize,
+    /// How much larger than the last term each of the last terms may be.
+    allowances: [f64; LAST],
     /// Factor by which steps and spans are divided in addition to the tolerance's demand.
     cuts: f64,
     coefficients: u64,
@@ -126,6 +128,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
     /// An arm in the given state. A step leaves out at most `tolerance` times the way that the joints turn in it.
     pub(crate) fn new(state: State<N, T>, tolerance: f64, order: usize) -> Self {
         let nothing = [T::default(); N];
+        let allowance = |missing| pow(tolerance, -length_in_f64(missing) / length_in_f64(order));
         Self {
             state,
             carry: State {
@@ -134,6 +137,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
             },
             tolerance,
             order,
+            allowances: std::array::from_fn(|i| allowance(LAST - 1 - i)),
             cuts: 1.0,
             coefficients: 0,
             step: f64::INFINITY,
@@ -212,10 +216,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
         let first = self.order + 1 - LAST;
         let mut power = (0..first).fold(1.0, |power, _| power * step);
         let mut excess = 0.0_f64;
-        for order in first..=self.order {
-            // Terms of lower order may be larger.
-            let missing = length_in_f64(self.order - order) / length_in_f64(self.order);
-            let allowance = pow(self.tolerance, -missing);
+        for (order, allowance) in (first..).zip(self.allowances) {
             excess = excess.max(self.excess(order, step, power) / allowance);
             power *= step;
         }
