@@ -69,26 +69,6 @@ fn any_number_of_steps_agrees_with_50_digits() {
     }
 }
 
-/// Steps that agree with 50 digits have the errors of the oracle, which fall by these orders. A problem that a method
-/// solves exactly has none, and some problems have a higher one.
-#[test]
-fn every_method_has_the_least_order_of_the_stored_problems() {
-    for one in Method::ALL {
-        let mut cases = entries(STORED, "orders");
-        cases.retain(|case| method(case) == one);
-        let last =
-            |case: &Value, name: &str| case[name].as_array().unwrap().last().unwrap().as_f64();
-        let orders = cases
-            .iter()
-            .flat_map(|case| [last(case, "order_x"), last(case, "order_v")]);
-        let least = orders.flatten().fold(f64::INFINITY, f64::min);
-        assert!(
-            (least - f64::from(one.order())).abs() < 0.1,
-            "{one}: {least}"
-        );
-    }
-}
-
 /// The time is right at every stage, for a step that starts anywhere and any number of joints.
 #[test]
 fn every_method_evaluates_at_the_times_of_its_stages_and_no_more() {
