@@ -45,14 +45,6 @@ fn the_pace_after_a_stall_is_the_usual_one() {
     }
 }
 
-/// Three steps of 10 s in a stall of 30 s would come all at once; the one that was in progress is enough.
-#[test]
-fn a_stall_at_a_timestep_of_seconds_makes_one_step() {
-    let mut pacer = Pacer::new(Duration::ZERO, 10.0);
-    assert_eq!(pacer.due(ns(5 * SECOND)), 0);
-    assert_eq!(pacer.due(ns(39 * SECOND)), 1);
-}
-
 #[test]
 fn a_restart_discards_the_unfinished_fraction_and_the_due_steps() {
     let mut pacer = Pacer::new(Duration::ZERO, 0.01);

@@ -6,24 +6,15 @@ use std::process::Command;
 use super::{codes, printed};
 use crate::papers::{table, text};
 
-/// The lines of a manifest, each with its section.
-fn by_section(manifest: &str) -> impl Iterator<Item = (&str, &str)> {
-    let mut section = "";
-    manifest.lines().filter_map(move |line| {
-        if line.starts_with('[') {
-            section = line;
-            return None;
-        }
-        Some((section, line))
-    })
-}
-
 #[test]
 fn the_papers_have_a_reason_for_every_dependency() {
     let manifest = text("Cargo.toml");
-    let dependencies: BTreeSet<String> = by_section(&manifest)
-        .filter(|(section, _)| section.ends_with("dependencies]"))
-        .filter_map(|(_, line)| Some(line.split_once(" =")?.0.to_owned()))
+    let is_named = |section: &&str| section.lines().next().unwrap().ends_with("dependencies]");
+    let dependencies: BTreeSet<String> = manifest
+        .split("\n[")
+        .filter(is_named)
+        .flat_map(str::lines)
+        .filter_map(|line| Some(line.split_once(" =")?.0.to_owned()))
         .collect();
     let mut named = BTreeSet::new();
     for row in table(&text("docs/development.md"), "crate") {
