@@ -17,10 +17,7 @@ fn acceleration(case: &Value) -> Acceleration {
     match case["problem"].as_str().unwrap() {
         "t" => |t, _, _| t,
         "sin" => |t, _, _| t.sin(),
-        "quadratic" => |t, _, _| t * t + 3.0 * t - 1.0,
-        "neg_linear" => |t, _, _| -t + 1.0,
         "damped_cos" => |t, _, _| (-t).exp() * (5.0 * t).cos(),
-        "rational" => |t, _, _| 1.0 / (1.0 + t * t),
         "constant" => |_, _, _| -9.81,
         "osc_damped_driven" => |t, x, v| -4.0 * x - 0.5 * v + t.sin(),
         "oscillator" => |_, x, _| -x,
