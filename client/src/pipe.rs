@@ -231,8 +231,66 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         assert_eq!(status["level"], "info", "{status}");
     }
 
-    /// Waits until the runtime has handled all sent frames, because a call is answered in order.
+    /// Ends all subscriptions to `topic`.
+    pub async fn unsubscribe(&mut self, topic: &str) {
+        self.send(&json!({"op": "unsubscribe", "topic": topic}))
+            .await;
+        self.settle().await;
+    }
+
+    /// Publishes a message, which the runtime has then handled. Error statuses are ignored.
+    async fn publish(&mut self, topic: &str, msg: Value) {
+        self.send(&json!({"op": "publish", "topic": topic, "msg": msg}))
+            .await;
+        self.settle().await;
+    }
+
+    /// Publishes a setpoint.
+    pub async fn publish_trajectory(&mut self, positions: Value) {
+        let points = json!([{ "positions": positions }]);
+        self.publish("/joint_trajectory", json!({"points": points}))
+            .await;
+    }
+
+    /// Commands an effort, which the runtime refuses if the controller is on.
+    pub async fn command_effort(&mut self, effort: Value) {
+        self.publish("/effort_controller/commands", json!({"data": effort}))
+            .await;
+    }
+
+    /// Turns the controller on.
+    pub async fn enable(&mut self) {
+        self.ask("/pid_controller/enable", json!({"data": true}))
+            .await;
+    }
+
+    /// Waits until the runtime has handled all sent frames, because a call is answered in order. The answer is not
+    /// stored.
     pub async fn settle(&mut self) {
         self.ask("/arm_sim/set_params", json!({})).await;
+        self.received.pop();
     }
+
+    /// Lets `time` pass, and returns the stored messages on `topic` of that time.
+    pub async fn messages_for(&mut self, time: Duration, topic: &str) -> Vec<Value> {
+        let before = self.received.len();
+        let listen = async {
+            loop {
+                self.receive().await;
+            }
+        };
+        let _: Result<(), _> = timeout(time, listen).await;
+        messages(&self.received[before..], topic)
+    }
+
+    /// The stored messages on `topic` so far.
+    #[must_use]
+    pub fn messages(&self, topic: &str) -> Vec<Value> {
+        messages(&self.received, topic)
+    }
+}
+
+fn messages(frames: &[Value], topic: &str) -> Vec<Value> {
+    let on_topic = frames.iter().filter(|frame| frame["topic"] == topic);
+    on_topic.map(|frame| frame["msg"].clone()).collect()
 }

@@ -1,20 +1,20 @@
 //! A panic ends its task or the whole program: each case, with a panic that only a test can cause.
 //!
+//! A panic in a computation is in `src/actors/compute/workers/tests.rs`.
+//!
 //! **Invariant:** the panic hook belongs to the process, so these tests share one that records panics and ends
 //! nothing.
 
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
-use crate::system::{in_real_time, in_virtual_time};
+use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Node, WIDE, Watched, settle};
 use bytes::Bytes;
-use pendularm::actors::compute::workers::{Computation, Progress, WorkerPool};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::node::Publish;
 use pendularm::actors::panics::{self, contain, contained};
-use pendularm::actors::wire::Caller;
 use pendularm::protocol::catalog::{Service, Topic};
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -121,52 +121,6 @@ fn a_panic_in_the_actor_of_a_client_ends_that_client_alone() {
         assert_eq!(other.receive().await["id"], 1);
     });
     assert!(!has_ended_by("in the actor"));
-}
-
-/// A computation that panics with its caller unanswered.
-struct Panicking(#[expect(dead_code, reason = "dropped by the panic, which answers it")] Caller);
-
-impl Computation for Panicking {
-    fn advance(&mut self, _: std::time::Instant) -> Progress {
-        panic!("in a computation");
-    }
-
-    fn refuse(&mut self, _: &str) {}
-}
-
-#[test]
-fn a_panic_in_a_computation_is_answered_and_its_worker_works_on() {
-    ends();
-    in_real_time(async {
-        let workers = WorkerPool::start(1).unwrap();
-        let pool = workers.clone();
-        let mut nodes = Nodes::default();
-        let node = Node {
-            on_call: Box::new(move |call| {
-                pool.submit(Box::new(Panicking(call.caller)));
-            }),
-            ..Node::default()
-        };
-        node.attach(&mut nodes, &[Service::IntegrationStep], &[]);
-        let gateway = Gateway::with(nodes).await;
-        let mut client = gateway.connect(WIDE);
-        for id in 0..3 {
-            client.call("/arm_sim/integration_step", id).await;
-            let response = client.receive().await;
-            assert_eq!(
-                (&response["id"], &response["result"]),
-                (&json!(id), &json!(false))
-            );
-            assert!(
-                response["status"]
-                    .as_str()
-                    .unwrap()
-                    .contains("ended before it answered")
-            );
-        }
-        workers.close("the end");
-    });
-    assert!(!has_ended_by("in a computation"));
 }
 
 #[test]

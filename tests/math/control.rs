@@ -85,22 +85,3 @@ fn the_integral_stops_at_its_limit_and_comes_back_from_it_at_once() {
     let back = INTEGRAL_LIMIT - 1.0;
     assert_eq!(pid.integral(), &[back, -back]);
 }
-
-#[test]
-fn gains_a_setpoint_and_enabling_what_is_enabled_keep_the_integral() {
-    let mut pid = pid();
-    pid.commit([3.0, -4.0]);
-    let before = pid.clone();
-    pid.enable(true);
-    assert_eq!(pid, before);
-    pid.set_gains(gains([1.0; 2], [1.0; 2], [1.0; 2]));
-    assert_eq!(pid.integral(), &[3.0, -4.0]);
-    let setpoint = Setpoint {
-        position: [0.5, 1.0],
-        velocity: [-1.0, 2.0],
-    };
-    pid.set_setpoint(setpoint);
-    assert_eq!(pid.integral(), &[3.0, -4.0]);
-    assert_eq!(pid.gains().kp, [1.0; 2]);
-    assert_eq!(pid.setpoint(), &setpoint);
-}

@@ -132,16 +132,6 @@ fn a_message_without_a_setpoint_is_rejected_with_the_reason_of_its_row() {
     }
 }
 
-/// A long array costs time, not memory; the message says how long it was.
-#[test]
-fn a_million_positions_are_counted_and_rejected() {
-    let positions = vec!["1"; 1_000_000].join(",");
-    assert_eq!(
-        rejection(&format!(r#"{{"points":[{{"positions":[{positions}]}}]}}"#)),
-        "points[0].positions must have 3 entries, got 1000000"
-    );
-}
-
 proptest! {
     #[test]
     fn names_in_any_order_give_every_joint_its_own_value(

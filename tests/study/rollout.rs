@@ -197,10 +197,6 @@ fn a_run_whose_work_is_not_bounded_is_refused() {
     for (change, name, got) in rows {
         assert_eq!(with(change), format!("{name} {positive} {got}"));
     }
-    let many = "duration / timestep must be at most 1e7 steps, got 1e300";
-    assert_eq!(with(&|ask| ask.control.timestep = 1e-300), many);
-    let few = "samples must be between 2 and 100000, got 1";
-    assert_eq!(with(&|ask| ask.samples = 1), few);
 }
 
 /// The true local error is that against the arm followed to rounding. Where a step is well resolved, what the estimate

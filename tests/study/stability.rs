@@ -27,29 +27,6 @@ fn stored(kind: &str) -> Vec<Value> {
     cases
 }
 
-/// For an oscillator at ω = 1 the state is `(x, v)`, as the stored matrices have it. Entries are sums of terms `(h λ)^k / k!`
-/// with `λ <= 1 + 2 z`, each a few times rounded.
-#[test]
-fn the_step_matrix_of_an_oscillator_is_the_stored_one() {
-    for case in stored("linear") {
-        let (method, z) = (method(&case), number(&case["z"]));
-        let oscillator = Linear::oscillator(1.0, 0.0, 0.0, 2.0 * z);
-        for sample in case["samples"].as_array().unwrap() {
-            let h = number(&sample["h"]);
-            let matrix = step_matrix(&oscillator, method, Sampling::Continuous, h);
-            let size = h * (1.0 + 2.0 * z);
-            let scale = 1.0 + size * (1.0 + size * (0.5 + size * (1.0 / 6.0 + size / 24.0)));
-            for (at, expected) in list(&sample["A"]).into_iter().enumerate() {
-                let error = (matrix[(at / 2, at % 2)] - expected).abs();
-                assert!(error < 4e-16 * scale, "{method} z {z} h {h}");
-            }
-            // A double eigenvalue keeps half of the digits.
-            let error = (matrix.spectral_radius() - number(&sample["rho"])).abs();
-            assert!(error < 1e-7 * scale, "{method} z {z} h {h}");
-        }
-    }
-}
-
 /// Growth counts from 1e-11 of the fastest eigenvalue on, which at a damping ratio of 0.01 is 1e-9 of the timestep. Where
 /// two eigenvalues meet on the circle (z = 0, 1/2, 1) half of their digits are lost.
 #[test]

@@ -4,7 +4,6 @@
 //! A test calls a node as another node does ([`asked`]), and receives the messages of a subscriber. A virtual second
 //! takes almost no real time, and always passes in the same way. So steps, messages and their order can be counted.
 
-use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -24,11 +23,10 @@ use pendularm::math::pid::Setpoint;
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::Topic;
 use pendularm_client::pipe;
-use serde_json::{Value, json};
 use tokio::io::DuplexStream;
 use tokio::sync::mpsc::UnboundedSender;
 use tokio::sync::oneshot;
-use tokio::time::{sleep, timeout};
+use tokio::time::sleep;
 
 /// Longest virtual time of an operation before a test fails.
 pub const PATIENCE: Duration = Duration::from_secs(600);
@@ -124,86 +122,11 @@ where
 pub fn connect(registry: &Addr<Registry>, gauges: &Arc<Gauges>) -> Client {
     let (ours, theirs) = tokio::io::duplex(1 << 20);
     Connection::start_on(theirs, registry.clone(), Arc::clone(gauges));
-    Client(pipe::Client::on(ours, PATIENCE).remembering())
+    Client::on(ours, PATIENCE).remembering()
 }
 
 /// A client, over a pipe, that remembers every frame it has received.
-pub struct Client(pipe::Client<DuplexStream>);
-
-impl Deref for Client {
-    type Target = pipe::Client<DuplexStream>;
-
-    fn deref(&self) -> &Self::Target {
-        &self.0
-    }
-}
-
-impl DerefMut for Client {
-    fn deref_mut(&mut self) -> &mut Self::Target {
-        &mut self.0
-    }
-}
-
-impl Client {
-    /// Receives all messages until now; the requests that this needs are not recorded.
-    pub async fn settle(&mut self) {
-        self.0.settle().await;
-        self.received.pop();
-    }
-
-    pub async fn unsubscribe(&mut self, topic: &str) {
-        self.send(&json!({"op": "unsubscribe", "topic": topic}))
-            .await;
-        self.settle().await;
-    }
-
-    pub async fn enable(&mut self) {
-        self.ask("/pid_controller/enable", json!({"data": true}))
-            .await;
-    }
-
-    pub async fn publish_trajectory(&mut self, positions: Value) {
-        self.send(&json!({"op": "publish", "topic": "/joint_trajectory",
-            "msg": {"points": [{"positions": positions}]}}))
-            .await;
-        self.settle().await;
-    }
-
-    /// Commands an effort. The error status is ignored if the controller is on.
-    pub async fn command_effort(&mut self, effort: Value) {
-        self.send(
-            &json!({"op": "publish", "topic": "/effort_controller/commands",
-            "msg": {"data": effort}}),
-        )
-        .await;
-        self.settle().await;
-    }
-
-    /// Lets `time` pass, and returns the messages on `topic` in that time.
-    pub async fn messages_for(&mut self, time: Duration, topic: &str) -> Vec<Value> {
-        let before = self.received.len();
-        let listen = async {
-            loop {
-                self.receive().await;
-            }
-        };
-        let _: Result<(), _> = timeout(time, listen).await;
-        messages(&self.received[before..], topic)
-    }
-
-    /// The messages on `topic` so far.
-    pub fn messages(&self, topic: &str) -> Vec<Value> {
-        messages(&self.received, topic)
-    }
-}
-
-fn messages(frames: &[Value], topic: &str) -> Vec<Value> {
-    frames
-        .iter()
-        .filter(|frame| frame["topic"] == topic)
-        .map(|frame| frame["msg"].clone())
-        .collect()
-}
+pub type Client = pipe::Client<DuplexStream>;
 
 /// Lets virtual time pass.
 pub async fn pass(time: Duration) {

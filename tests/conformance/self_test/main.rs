@@ -6,12 +6,15 @@
     clippy::panic,
     clippy::print_stdout,
     clippy::unwrap_used,
+    dead_code,
     unreachable_pub,
-    reason = "a test that panics has failed"
+    reason = "a test that panics has failed; programs share their helpers"
 )]
 
+#[path = "../../support/common.rs"]
+#[rustfmt::skip]
+mod common;
 mod faults;
-mod program;
 mod proxy;
 
 use std::collections::BTreeSet;
@@ -24,18 +27,18 @@ use pendularm_conformance::bench::Found;
 use pendularm_conformance::{Row, Rule, Selection, rules, run, totals};
 use serde_json::Value;
 
+use common::Runtime;
 use faults::Planted;
-use program::Program;
 use proxy::{Fault, Proxy, Side};
 
 /// Programs that are tested at once. A rule waits longer than it computes.
 const WORKERS: usize = 16;
 
 /// The results of `try_one` for each item, at several programs at once.
-fn of_each<T: Sync, R: Send>(links: usize, items: &[T], try_one: impl Fn(&Program, &T) -> R + Sync) -> Vec<R> {
+fn of_each<T: Sync, R: Send>(links: usize, items: &[T], try_one: impl Fn(&Runtime, &T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let work = || {
-        let program = Program::start(links);
+        let program = Runtime::with_links(links);
         let mut results = Vec::new();
         while let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) {
             results.push(try_one(&program, item));
@@ -52,7 +55,7 @@ fn all_hold(links: usize) {
     let ids: Vec<&str> = rules::all().filter(|rule| rule.applies_to(links)).map(|rule| rule.id).collect();
     let rows: Vec<Row> = of_each(links, &ids, |program, id| {
         let selection = Selection { rule: Some((*id).to_owned()), ..Selection::default() };
-        let mut rows = run(&program.address, &selection, |_| {}).unwrap();
+        let mut rows = run(&program.address.to_string(), &selection, |_| {}).unwrap();
         rows.retain(|row| row.rule.id == *id);
         rows.pop().unwrap()
     });
@@ -85,14 +88,14 @@ fn every_rule_has_a_check_and_every_fault_a_rule() {
 
 /// The outcome of a rule against a server with a fault: nothing if it fails for the fault. On a busy machine the suite
 /// may fail to prepare the arm. That is no result, so the rule is tried again.
-fn escapes(program: &Program, found: &Found, planted: &Planted, links: usize) -> Option<String> {
+fn escapes(program: &Runtime, found: &Found, planted: &Planted, links: usize) -> Option<String> {
     let mut outcome = String::new();
     for _ in 0..3 {
-        let proxy = Proxy::start(&program.address, planted.fault(links));
+        let proxy = Proxy::start(&program.address.to_string(), planted.fault(links));
         let selection = Selection { rule: Some(planted.rule.to_owned()), ..Selection::default() };
         let rows = run(&proxy.address, &selection, |_| {});
         // Without the proxy, so the next fault meets the server in its initial state.
-        found.restore(&program.address);
+        found.restore(&program.address.to_string());
         match rows.as_deref() {
             Ok([row]) => match &row.got {
                 Err(why) if !why.starts_with("while preparing") => {
@@ -118,7 +121,7 @@ fn each_fails(links: usize) {
     let without: Vec<_> = ids.difference(&covered).collect();
     assert!(without.is_empty(), "rules without a fault: {without:?}");
     let outcomes = of_each(links, &planted, |program, planted| {
-        let found = Found::at(&program.address).unwrap();
+        let found = Found::at(&program.address.to_string()).unwrap();
         escapes(program, &found, planted, links)
     });
     let escaped: Vec<String> = outcomes.into_iter().flatten().collect();
@@ -152,12 +155,12 @@ fn a_port_without_a_server_and_a_silent_server_are_reported_soon() {
 /// Like an unfinished server, on which the rules of the other sections can be tried.
 #[test]
 fn services_that_never_answer_fail_their_own_rules_alone() {
-    let program = Program::start(2);
+    let program = Runtime::start();
     let fault: Fault = Box::new(|_, _, frame| {
         let service = frame["service"].as_str().unwrap_or_default();
         if service.starts_with("/ik_") { vec![] } else { vec![frame] }
     });
-    let proxy = Proxy::start(&program.address, fault);
+    let proxy = Proxy::start(&program.address.to_string(), fault);
     let selection = Selection { rule: Some("reset".to_owned()), ..Selection::default() };
     let rows = run(&proxy.address, &selection, |_| {}).unwrap();
     assert!(!rows.is_empty() && rows.iter().all(Row::holds), "{rows:?}");
@@ -165,7 +168,7 @@ fn services_that_never_answer_fail_their_own_rules_alone() {
 
 #[test]
 fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
-    let program = Program::start(2);
+    let program = Runtime::start();
     let mut asked = 0;
     let fault: Fault = Box::new(move |side, _, mut frame| {
         if side == Side::Server {
@@ -181,7 +184,7 @@ fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
         }
         vec![frame]
     });
-    let proxy = Proxy::start(&program.address, fault);
+    let proxy = Proxy::start(&program.address.to_string(), fault);
     let selection = Selection { category: Some("pid".to_owned()), ..Selection::default() };
     let rows = run(&proxy.address, &selection, |_| {}).unwrap();
     let holding: Vec<String> = rows.iter().filter(|row| row.holds()).map(Row::to_string).collect();

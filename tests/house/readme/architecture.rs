@@ -87,48 +87,22 @@ fn every_function_on_the_way_of_a_frame_exists() {
     }
 }
 
-/// The files in the table with this header, and the names in each. Returns the number of files and of their lines.
-fn walk(header: &str) -> (usize, usize) {
-    let rows = table(&text("ARCHITECTURE.md"), header);
-    let mut lines = 0;
-    for row in &rows {
-        let path = codes(&row[0])[0];
-        let source = text(path);
-        lines += source.lines().count();
-        let names = codes(&row[1]);
-        assert!(!names.is_empty(), "{path}: no name");
-        let kinds = ["fn", "struct", "enum", "trait"];
-        let is_start = |before: &str| {
-            kinds
-                .iter()
-                .any(|kind| before.ends_with(&format!("{kind} ")))
-        };
-        for (place, name) in names.into_iter().enumerate() {
-            let mut found = source.match_indices(name).peekable();
-            let is_named = found.peek().is_some();
-            let is_defined = found.any(|(at, _)| {
-                let after = &source[at + name.len()..];
-                is_start(&source[..at]) && after.starts_with(['(', '<', ' ', ':'])
-            });
-            // The first one is defined there.
-            assert!(is_defined || (place > 0 && is_named), "{path}: no {name}");
-        }
-    }
-    let paths: BTreeSet<&str> = rows.iter().map(|row| codes(&row[0])[0]).collect();
-    assert_eq!(paths.len(), rows.len(), "a file is listed twice");
-    (rows.len(), lines)
-}
-
-/// The bounds are the present lengths, so a longer walk fails the test.
+/// The names in the cell of a file are in it, and the first one is defined there.
 #[test]
-fn the_walks_name_existing_files_and_become_no_longer() {
-    for (header, most_files, most_lines) in [
-        ("a message passes", 17, 6_070),
-        ("a call passes", 21, 7_407),
-    ] {
-        let (files, lines) = walk(header);
-        let is_short = files <= most_files && lines <= most_lines;
-        assert!(is_short, "{header} {files} files, {lines} lines");
+fn the_walks_name_existing_files_and_their_names() {
+    let paper = text("ARCHITECTURE.md");
+    for row in ["a message passes", "a call passes"]
+        .map(|header| table(&paper, header))
+        .concat()
+    {
+        let path = codes(&row[0])[0];
+        let (source, names) = (text(path), codes(&row[1]));
+        let kinds = ["fn", "struct", "enum", "trait"];
+        let is_defined = kinds
+            .iter()
+            .any(|kind| source.contains(&format!("{kind} {}", names[0])));
+        let is_there = is_defined && names.iter().all(|name| source.contains(name));
+        assert!(is_there, "{path}: {names:?}");
     }
 }
 

@@ -1,4 +1,4 @@
-//! The manifests: dependencies and their reasons, licences, the profile of the fuzz targets, and the oldest compiler.
+//! The manifests: dependencies and their reasons, licences, and the oldest compiler.
 
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -6,24 +6,15 @@ use std::process::Command;
 use super::{codes, printed};
 use crate::papers::{table, text};
 
-/// The lines of a manifest, each with its section.
-fn by_section(manifest: &str) -> impl Iterator<Item = (&str, &str)> {
-    let mut section = "";
-    manifest.lines().filter_map(move |line| {
-        if line.starts_with('[') {
-            section = line;
-            return None;
-        }
-        Some((section, line))
-    })
-}
-
 #[test]
 fn the_papers_have_a_reason_for_every_dependency() {
     let manifest = text("Cargo.toml");
-    let dependencies: BTreeSet<String> = by_section(&manifest)
-        .filter(|(section, _)| section.ends_with("dependencies]"))
-        .filter_map(|(_, line)| Some(line.split_once(" =")?.0.to_owned()))
+    let is_named = |section: &&str| section.lines().next().unwrap().ends_with("dependencies]");
+    let dependencies: BTreeSet<String> = manifest
+        .split("\n[")
+        .filter(is_named)
+        .flat_map(str::lines)
+        .filter_map(|line| Some(line.split_once(" =")?.0.to_owned()))
         .collect();
     let mut named = BTreeSet::new();
     for row in table(&text("docs/development.md"), "crate") {
@@ -38,28 +29,6 @@ fn the_licence_files_are_those_that_the_manifest_names() {
     assert!(text("Cargo.toml").contains("license = \"MIT OR Apache-2.0\""));
     assert!(text("LICENSE-MIT").contains("Permission is hereby granted, free of charge"));
     assert!(text("LICENSE-APACHE").contains("Apache License"));
-}
-
-/// With another profile they could not reuse the build of `make test`, and CI would build everything twice.
-#[test]
-fn the_fuzz_targets_are_built_as_the_tests_are() {
-    let profile = |path: &str| -> BTreeSet<String> {
-        by_section(&text(path))
-            .filter(|(section, line)| section.starts_with("[profile.dev") && line.contains('='))
-            .map(|(section, line)| format!("{section} {line}"))
-            .collect()
-    };
-    let lock = text("fuzz/Cargo.lock");
-    let mut tests = profile("Cargo.toml");
-    tests.retain(|setting| {
-        let package = setting.strip_prefix("[profile.dev.package.");
-        package.is_none_or(|rest| {
-            let name = rest.split(']').next().unwrap();
-            lock.contains(&format!("name = \"{name}\""))
-        })
-    });
-    assert!(tests.len() > 3, "{tests:?}");
-    assert_eq!(profile("fuzz/Cargo.toml"), tests);
 }
 
 /// `rust-version` is a promise to users with an older compiler, so no package may need a newer one.

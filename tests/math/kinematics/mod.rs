@@ -1,4 +1,4 @@
-//! Forward and inverse kinematics against stored 60-digit values, and against each other over the whole reachable set.
+//! Forward kinematics against stored 60-digit values, and inverse kinematics against them over the whole reachable set.
 
 mod choices;
 mod edges;
@@ -13,24 +13,14 @@ use pendularm::math::kinematics::{
     BOUNDARY, Reach, Target, Unreachable, forward, heading, joints, nearest_turn, solve, turn, wrap,
 };
 use proptest::prelude::*;
-use serde_json::Value;
 
-use crate::stored::entries;
-
-/// Error that contract and oracle allow in a round trip, as a share of the sum of the lengths.
+/// Error that the contract allows in a round trip, as a share of the sum of the lengths.
 const ROUND_TRIP: f64 = 1e-9;
 
 /// Error of the closed form on targets that are not moved onto a boundary. The wrist, the angles and their sines take a
 /// dozen roundings, each 2⁻⁵³ of at most the sum of the lengths or π. An orientation a whole turn away loses 1e-15
 /// more.
 const INTERIOR: f64 = 4e-15;
-
-fn oracle(kind: &str) -> Vec<Value> {
-    let mut cases = entries(include_str!("../../data/kinematics.json"), "cases");
-    cases.retain(|case| case["type"] == kind);
-    assert!(!cases.is_empty());
-    cases
-}
 
 fn at(x: f64, y: f64) -> Target {
     Target {

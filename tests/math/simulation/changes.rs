@@ -1,4 +1,4 @@
-//! Changes from outside: a reset, control on and off, a state, a push. Each has its effect, and changes nothing else.
+//! Another state, and the exact steps of a disturbance. `rules.rs` has all other inputs.
 
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
@@ -6,39 +6,6 @@ use pendularm::math::pid::Gains;
 use pendularm::math::simulation::Simulation;
 
 use super::moving;
-
-#[test]
-fn a_reset_puts_back_pose_clock_setpoint_integral_and_effort_and_nothing_else() {
-    let mut simulation = moving(Method::Verlet);
-    simulation.set_timestep(0.002);
-    simulation.set_arm(Arm::new([0.5, 1.5], [2.0, 1.0], 3.7).unwrap());
-    let mut expected = Simulation::new(*simulation.arm(), *simulation.pid().gains());
-    expected.set_method(Method::Verlet);
-    expected.set_timestep(0.002);
-    expected.enable(true);
-    simulation.advance(333);
-    assert_ne!(simulation.effort(), &[0.0; 2]);
-    simulation.reset();
-    assert_eq!(simulation, expected);
-    assert_eq!(simulation.time(), 0.0);
-    assert!(simulation.pid().is_enabled());
-}
-
-#[test]
-fn disabling_control_zeroes_the_effort_at_once_and_leaves_the_motion() {
-    let mut simulation = moving(Method::Rk4);
-    simulation.advance(50);
-    let state = *simulation.state();
-    assert_ne!(simulation.effort(), &[0.0; 2]);
-    simulation.enable(false);
-    assert_eq!(simulation.effort(), &[0.0; 2]);
-    assert_eq!(simulation.state(), &state);
-    let setpoint = *simulation.pid().setpoint();
-    simulation.enable(true);
-    assert_eq!(simulation.effort(), &[0.0; 2], "no step since");
-    assert_eq!(simulation.pid().integral(), &[0.0; 2]);
-    assert_eq!(simulation.pid().setpoint(), &setpoint);
-}
 
 #[test]
 fn a_state_that_is_put_in_carries_nothing_over_from_the_old_one() {
@@ -81,43 +48,6 @@ fn a_disturbance_is_in_every_step_that_begins_within_its_time() {
                 let pushed = pushed_steps(timestep, duration, before);
                 assert_eq!(pushed, steps, "{timestep} {duration} {before}");
             }
-        }
-    }
-}
-
-#[test]
-fn an_arm_whose_disturbance_is_over_steps_as_one_that_never_had_any() {
-    let state = |push: bool| {
-        let mut simulation = Simulation::<3>::new(Arm::default(), Gains::default());
-        simulation.enable(true);
-        if push {
-            simulation.disturb([0.0; 3], 0.05);
-        }
-        simulation.advance(100);
-        simulation
-    };
-    // Adding zeros changes no bit of an effort other than a zero's sign, which moves nothing.
-    assert_eq!(state(true), state(false));
-    let mut pushed = state(false);
-    pushed.disturb([1.0; 3], 1.0);
-    pushed.reset();
-    let mut fresh = state(false);
-    fresh.reset();
-    assert_eq!(pushed, fresh);
-}
-
-/// The prediction of a step must use the effort of that step.
-#[test]
-fn the_predicted_effort_is_the_effort_of_the_next_step() {
-    for on in [false, true] {
-        let mut simulation = moving(Method::Rk4);
-        simulation.enable(on);
-        simulation.disturb([3.0, -5.0], 0.01);
-        for step in 0..20 {
-            let told = simulation.effort_of_next_step();
-            simulation.step();
-            assert_eq!(simulation.effort(), &told, "step {step}");
-            assert_eq!(told == [0.0; 2], !on && step >= 10, "step {step}");
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod changes;
 mod motion;
+mod rules;
 mod stepping;
 
 use pendularm::math::arm::{Arm, State};

@@ -1,6 +1,5 @@
 //! Any stream, split anywhere. The fuzz target `frame` compares the reader with a slow model of the rules.
 
-use pendularm::protocol::wire::frame::opening;
 use proptest::prelude::*;
 
 use super::{nested, outcomes, read};
@@ -55,13 +54,5 @@ proptest! {
         let stream = frames.join(if newline { "\n" } else { "" });
         let read: Vec<String> = outcomes(stream.as_bytes()).into_iter().map(Result::unwrap).collect();
         prop_assert_eq!(read, frames);
-    }
-
-    #[test]
-    fn no_bytes_make_the_reader_panic(
-        pieces in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..80), 0..8),
-    ) {
-        read(pieces.iter().map(Vec::as_slice));
-        let _ = opening(&pieces.concat());
     }
 }
