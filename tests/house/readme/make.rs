@@ -62,6 +62,64 @@ fn every_filter_of_a_test_in_the_documents_names_a_module() {
     assert!(filters > 10, "{filters} filters");
 }
 
+/// A target that CI does not run can break unnoticed. Functions without a call do not count.
+#[test]
+fn ci_runs_every_target() {
+    let makefile = text("Makefile");
+    let script = text(".ci/run");
+    let words = |part: &str| -> BTreeSet<String> {
+        let split = part.split(|c: char| !(c.is_alphanumeric() || "_-".contains(c)));
+        split.map(str::to_owned).collect()
+    };
+    // Functions by name; a body ends with a brace alone.
+    let mut bodies = std::collections::BTreeMap::new();
+    let mut reached = String::new();
+    let mut open: Option<&str> = None;
+    let is_code = |line: &&str| !line.trim_start().starts_with('#');
+    for line in script.lines().filter(is_code) {
+        if let Some(name) = line.strip_suffix("() {") {
+            open = Some(name);
+        } else if line == "}" {
+            open = None;
+        } else if let Some(name) = open {
+            *bodies.entry(name).or_insert_with(String::new) += &format!("{line}\n");
+        } else {
+            reached += &format!("{line}\n");
+        }
+    }
+    while let Some(name) = bodies
+        .keys()
+        .copied()
+        .find(|&name| words(&reached).contains(name))
+    {
+        reached += &bodies.remove(name).unwrap();
+    }
+    let mut run: BTreeSet<&str> = BTreeSet::new();
+    for line in reached.lines() {
+        let mut given = line.split_whitespace().skip_while(|word| *word != "make");
+        given.next();
+        while let Some(word) = given.next() {
+            match word {
+                "-o" | "-C" => drop(given.next()),
+                word => drop(run.insert(word)),
+            }
+        }
+    }
+    // Prerequisites are run with their target.
+    let rules: Vec<(&str, &str)> = rules(&makefile).collect();
+    for _ in &rules {
+        for (target, rule) in &rules {
+            if run.contains(target) {
+                let needs = rule.split("##").next().unwrap_or_default();
+                run.extend(needs.split([' ', ',', ')']).filter(|word| !word.is_empty()));
+            }
+        }
+    }
+    let mut forgotten: Vec<&str> = rules.iter().map(|(target, _)| *target).collect();
+    forgotten.retain(|target| !run.contains(target));
+    assert!(rules.len() > 30 && forgotten.is_empty(), "{forgotten:?}");
+}
+
 /// Under `make test` the outer make passes its own flags.
 fn make(arguments: &[&str]) -> Command {
     let mut command = Command::new("make");
