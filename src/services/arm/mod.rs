@@ -21,7 +21,7 @@ pub(crate) use self::disturb::DIVERGED;
 pub use self::disturb::{Disturb, Push};
 pub use self::gains::SetGains;
 pub use self::integrator::{Integrator, SetIntegrator};
-pub use self::messages::{joint_names, read_effort, read_setpoint};
+pub use self::messages::{joint_names, read_effort};
 pub use self::parameters::{
     AskParameters, NamedParameter, NotSet, ParameterChange, ParameterRequest, ParameterValue,
     parameter_services,

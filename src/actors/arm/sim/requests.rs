@@ -18,6 +18,7 @@ use crate::services::arm::{
     AskParameters, Disturb, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetPeriod,
     SetState, Step, parameter_services,
 };
+use crate::services::goals::Solve;
 
 impl<const N: usize> ArmSim<N> {
     /// Adds this node's services and topics to the registry's table.
@@ -33,6 +34,7 @@ impl<const N: usize> ArmSim<N> {
         nodes.serve::<Step<N>>(Service::Step, address.clone());
         nodes.serve::<Pause>(Service::Pause, address.clone());
         nodes.serve::<Enable>(Service::Enable, address.clone());
+        nodes.serve::<Solve<N>>(Service::Solve, address.clone());
         for service in parameter_services() {
             nodes.serve::<AskParameters<N>>(service, address.clone());
         }
