@@ -63,7 +63,7 @@ pub fn start_nodes<const N: usize>(
     nodes: &mut Nodes,
 ) -> Vec<Recipient<ShutDown>> {
     ArmSim::attach(arm, nodes);
-    let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
+    let rosapi = RosapiNode::new(registry.clone().recipient()).start();
     RosapiNode::attach(&rosapi, nodes);
     let frames = TfRepublisher::new(arm.clone().recipient(), registry.clone().recipient()).start();
     TfRepublisher::attach(&frames, nodes);

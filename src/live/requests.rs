@@ -11,7 +11,7 @@ use crate::math::simulation::{ArmInput, ControlPeriod};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::Rejections;
 use crate::services::arm::{
-    DIVERGED, Disturb, Enable, Integrator, Pause, PeriodInForce, Push, Reset, SetGains,
+    DIVERGED, Disturb, Enable, GetTime, Integrator, Pause, PeriodInForce, Push, Reset, SetGains,
     SetIntegrator, SetParams, SetPeriod, SetState,
 };
 use crate::services::goals::Solve;
@@ -100,6 +100,12 @@ impl<const N: usize> ArmRequest<N> for SetIntegrator {
             },
             rejected: self.rejected,
         }
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for GetTime {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> f64 {
+        arm.simulation.time()
     }
 }
 

@@ -16,6 +16,7 @@ mod reset;
 mod state;
 mod step;
 mod switches;
+mod time;
 
 pub(crate) use self::disturb::DIVERGED;
 pub use self::disturb::{Disturb, Push};
@@ -32,3 +33,4 @@ pub use self::reset::Reset;
 pub use self::state::SetState;
 pub use self::step::{MAX_STEPS, STEPS_IN_A_ROW, Step, Stepped, StepsEnd};
 pub use self::switches::{Enable, Pause};
+pub use self::time::GetTime;

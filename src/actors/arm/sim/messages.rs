@@ -16,7 +16,7 @@ use crate::study::control_loop::ControlLoop;
 
 // ---- time and settings ----------------------------------------------------------------------------------------------
 
-/// Requests simulation time \[s\]. From `rosapi` and `rosout`.
+/// Requests simulation time \[s\]. From `rosout`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "f64")]
 pub struct SimulationTime;
