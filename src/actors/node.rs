@@ -77,13 +77,8 @@ pub fn guard() -> (Done, oneshot::Receiver<()>) {
 
 /// The asker.
 pub trait Asker<T>: Send {
-    /// Sends the one answer. The guard of the call, if there is one, is sent with it.
+    /// Writes and sends the one answer. The guard of the call, if there is one, is sent with it.
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>);
-
-    /// Takes the one answer, and writes its response on the present thread.
-    fn answer_here(self: Box<Self>, answer: T) {
-        self.answer(Ok(answer), None);
-    }
 
     /// Whether the caller has disconnected.
     fn is_gone(&self) -> bool {
@@ -146,17 +141,15 @@ impl<T> Reply<T> {
         }
     }
 
-    /// Answers and ends the call, after all its effects. One message has both. The registry writes the response.
+    /// Answers and ends the call, after all its effects. One message has both.
     pub fn conclude(mut self, answer: T) {
         let done = self.done.take();
         self.send(Ok(answer), done);
     }
 
-    /// Answers. The response is written on the present thread. The call ends when this value is dropped.
+    /// Answers. The call ends when this value is dropped.
     pub fn answer(&mut self, answer: T) {
-        if let Some(asker) = self.take() {
-            asker.answer_here(answer);
-        }
+        self.send(Ok(answer), None);
     }
 
     /// Sends the error that there is no answer.
@@ -165,15 +158,10 @@ impl<T> Reply<T> {
     }
 
     fn send(&mut self, answer: Result<T, Unserved>, done: Option<Done>) {
-        if let Some(asker) = self.take() {
+        debug_assert!(self.asker.is_some(), "a call was answered twice");
+        if let Some(asker) = self.asker.take() {
             asker.answer(answer, done);
         }
-    }
-
-    fn take(&mut self) -> Option<Box<dyn Asker<T>>> {
-        let asker = self.asker.take();
-        debug_assert!(asker.is_some(), "a call was answered twice");
-        asker
     }
 }
 

@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 
-use super::arm::follow::{PathArm, PathFollower};
-use super::arm::ik::Ik;
+use super::arm::follow::PathFollower;
 use super::arm::ik_action::{GoalTracker, IkAction};
 use super::arm::ik_trial::{GoalClient, IkTrial};
 use super::arm::sim::{AddBarrier, ArmPose, ArmSim, SetLimitPredictor};
@@ -64,18 +63,20 @@ pub fn start_nodes<const N: usize>(
     nodes: &mut Nodes,
 ) -> Vec<Recipient<ShutDown>> {
     ArmSim::attach(arm, nodes);
-    arm.do_send(AddBarrier(registry.clone().recipient()));
-    let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
+    let rosapi = RosapiNode::new(registry.clone().recipient()).start();
     RosapiNode::attach(&rosapi, nodes);
     let frames = TfRepublisher::new(arm.clone().recipient(), registry.clone().recipient()).start();
     TfRepublisher::attach(&frames, nodes);
     let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
     Study::attach(&study, nodes);
     arm.do_send(SetLimitPredictor(study.recipient()));
-    let follower = PathFollower::new(PathArm::of(arm)).start();
+    let follower = PathFollower::new(arm.clone().recipient(), arm.clone().recipient()).start();
     PathFollower::attach(&follower, nodes);
     let (pose, tracker) = (arm.clone().recipient(), GoalTracker::of(arm));
     let (action, _) = start_goal_nodes(pose, tracker, registry, seed, nodes);
+    arm.do_send(AddBarrier(registry.clone().recipient()));
+    arm.do_send(AddBarrier(action.clone().recipient()));
+    arm.do_send(AddBarrier(follower.clone().recipient()));
     vec![
         arm.clone().recipient(),
         action.recipient(),
@@ -84,7 +85,7 @@ pub fn start_nodes<const N: usize>(
     ]
 }
 
-/// Starts the nodes `ik`, `ik_action` and `ik_trial` around the arm of these recipients. Returns the last two.
+/// Starts the nodes `ik_action` and `ik_trial` around the arm of these recipients.
 pub fn start_goal_nodes<const N: usize>(
     pose: Recipient<ArmPose<N>>,
     tracker: GoalTracker<N>,
@@ -93,9 +94,7 @@ pub fn start_goal_nodes<const N: usize>(
     nodes: &mut Nodes,
 ) -> (Addr<IkAction<N>>, Addr<IkTrial<N>>) {
     let publish = || registry.clone().recipient();
-    let ik = Ik::<N>::new(pose.clone()).start();
-    Ik::attach(&ik, nodes);
-    let action = IkAction::<N>::new(ik.recipient(), tracker, publish()).start();
+    let action = IkAction::<N>::new(tracker, publish()).start();
     IkAction::attach(&action, nodes);
     let goals = GoalClient {
         send: action.clone().recipient(),

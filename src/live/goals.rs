@@ -4,8 +4,10 @@
 
 use glam::DVec2;
 
+use crate::math::arm::State;
 use crate::math::goal::{Cadence, Criteria, Goal, Outcome};
-use crate::math::kinematics::forward;
+use crate::math::kinematics::{Target, forward};
+use crate::math::pid::Setpoint;
 use crate::math::simulation::Simulation;
 use crate::protocol::catalog::Service;
 
@@ -38,30 +40,32 @@ impl Obstacle {
 pub struct Pose<const N: usize> {
     /// Lengths of the links \[m\].
     pub lengths: [f64; N],
-    /// Joint positions \[rad\].
-    pub positions: [f64; N],
-    /// Simulation time \[s\].
+    /// Joint positions and velocities.
+    pub state: State<N>,
+    /// The held joint state.
+    pub setpoint: Setpoint<N>,
+    /// Simulation time since the last reset \[s\].
     pub time: f64,
     /// Resets of the arm so far.
     pub resets: u64,
     /// Simulation time since the start of the arm, over all resets \[s\]. It decreases only at a reset
     /// after thirty years.
     pub simulated: f64,
+    /// Whether it is paused and no step has been taken since.
+    pub stands_still: bool,
     /// Why it does not follow its setpoint; `None` if it does.
     pub obstacle: Option<Obstacle>,
 }
 
 /// A goal for the arm.
 #[derive(Debug, Clone, Copy)]
-pub struct GoalOrder<const N: usize> {
+pub struct GoalOrder {
     /// Identifies the goal. Each id is used once.
     pub number: u64,
-    /// The target of the end effector \[m\].
-    pub target: DVec2,
+    /// The target of the end effector.
+    pub target: Target,
     /// The condition for success.
     pub criteria: Criteria,
-    /// Joint positions that put the end effector there \[rad\].
-    pub solution: [f64; N],
 }
 
 /// The goal has begun.
@@ -186,13 +190,16 @@ fn end_effector<const N: usize>(simulation: &Simulation<N>) -> DVec2 {
     forward(simulation.arm().lengths(), &simulation.state().position).position
 }
 
+/// The state of a moving arm.
 pub(super) fn pose<const N: usize>(simulation: &Simulation<N>, past: Past) -> Pose<N> {
     Pose {
         lengths: *simulation.arm().lengths(),
-        positions: simulation.state().position,
+        state: *simulation.state(),
+        setpoint: *simulation.pid().setpoint(),
         time: simulation.time(),
         resets: past.resets,
         simulated: past.time + simulation.time(),
+        stands_still: false,
         obstacle: Obstacle::of(simulation),
     }
 }

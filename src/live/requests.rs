@@ -5,14 +5,16 @@
 
 use super::{LiveArm, World};
 use crate::math::arm::{Arm, State};
+use crate::math::kinematics::Unreachable;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::{ArmInput, ControlPeriod};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::Rejections;
 use crate::services::arm::{
-    DIVERGED, Disturb, Enable, Integrator, Pause, PeriodInForce, Push, Reset, SetGains,
+    DIVERGED, Disturb, Enable, GetTime, Integrator, Pause, PeriodInForce, Push, Reset, SetGains,
     SetIntegrator, SetParams, SetPeriod, SetState,
 };
+use crate::services::goals::Solve;
 use crate::services::{Ask, Echo};
 
 /// Why an effort is not applied.
@@ -98,6 +100,18 @@ impl<const N: usize> ArmRequest<N> for SetIntegrator {
             },
             rejected: self.rejected,
         }
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for GetTime {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> f64 {
+        arm.simulation.time()
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for Solve<N> {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Result<[f64; N], Unreachable> {
+        arm.solve(&self.0)
     }
 }
 

@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use super::goals::{GoalOrder, GoalProgress, Obstacle, Pose, Tracked, Tracking, pose};
 use super::{LiveArm, World};
 use crate::math::goal::{Cadence, Goal};
-use crate::math::kinematics::nearest_turn;
+use crate::math::kinematics::{Target, Unreachable, nearest_turn, solve};
 use crate::math::pid::Setpoint;
 use crate::math::simulation::ArmInput;
 
@@ -18,7 +18,10 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     /// The present state of the arm.
     #[must_use]
     pub fn pose(&self) -> Pose<N> {
-        pose(&self.simulation, self.goals.past)
+        Pose {
+            stands_still: self.paused && self.simulation.time() <= self.paused_at,
+            ..pose(&self.simulation, self.goals.past)
+        }
     }
 
     /// Whether each step is checked.
@@ -28,21 +31,38 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         tracked.is_some_and(|goal| goal.commanded)
     }
 
+    /// Joint positions that put the end effector on the target, with the elbow on the side of the present pose \[rad\].
+    ///
+    /// # Errors
+    /// If the target is out of reach.
+    pub fn solve(&self, target: &Target) -> Result<[f64; N], Unreachable> {
+        let (arm, state) = (self.simulation.arm(), self.simulation.state());
+        solve(arm.lengths(), &state.position, target)
+    }
+
     /// Begins a goal and ends the previous one, at the same time.
-    pub fn track_goal(&mut self, order: &GoalOrder<N>) -> Tracking<N> {
+    ///
+    /// # Errors
+    /// If the target is out of reach. Nothing changes then.
+    pub fn track_goal(&mut self, order: &GoalOrder) -> Result<Tracking<N>, Unreachable> {
+        let solution = self.solve(&order.target)?;
         self.goals.preempt(&self.simulation);
         let before = self.goals.latest;
         self.goals.tracked = Some(Tracked {
             number: order.number,
-            goal: Goal::new(order.target, order.criteria, self.simulation.time()),
+            goal: Goal::new(
+                order.target.position,
+                order.criteria,
+                self.simulation.time(),
+            ),
             feedback: Cadence::default(),
             commanded: false,
         });
-        Tracking {
-            positions: nearest_turn(&order.solution, &self.simulation.state().position),
+        Ok(Tracking {
+            positions: nearest_turn(&solution, &self.simulation.state().position),
             before,
             obstacle: Obstacle::of(&self.simulation),
-        }
+        })
     }
 
     /// Holds the goal's setpoint \[rad\] from the next step on, and checks the goal, unless it has ended.

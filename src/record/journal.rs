@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** finite numbers are read back unchanged. A note that does not fit the arm is refused.
 
-use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use crate::math::arm::{Arm, ArmError, State};
 use crate::math::integrator::Method;
@@ -12,6 +12,8 @@ use crate::protocol::wire::text::{excerpt, shortened};
 
 /// Longest message of the parser \[characters\]. It may quote the file.
 const MAX_WORDS: usize = 200;
+/// Most steps of a record: all numbers up to this are exact as a `float64`. A run takes years to exceed it.
+const MAX_STEPS: u64 = 1 << 53;
 
 /// An input of the arm's steps.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,134 +29,113 @@ pub enum Note<const N: usize> {
 /// Why a text is not a note.
 #[derive(Debug, thiserror::Error)]
 pub enum NoteError {
-    /// Not the JSON of a note.
+    /// Not JSON.
     #[error("not an input: {}", shortened(&.0.to_string(), MAX_WORDS))]
     Text(#[from] serde_json::Error),
-    /// A field, and the rule for it.
-    #[error("{0} must {1}")]
-    Field(&'static str, &'static str),
-    /// No method of that name.
-    #[error("unknown method {:?}", excerpt(.0))]
-    Method(
+    /// No input of that name.
+    #[error("not an input: {:?}", excerpt(.0))]
+    Kind(
         /// The name.
         String,
     ),
+    /// A field, and the rule for it.
+    #[error("{0} must {1}")]
+    Field(&'static str, &'static str),
     /// The arm is not valid.
     #[error(transparent)]
     Arm(#[from] ArmError),
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-enum Written {
-    Begin(Box<WrittenCheckpoint>),
-    Method(String),
-    Timestep(f64),
-    Params(WrittenArm),
-    Gains(WrittenGains),
-    Enable(bool),
-    Setpoint(WrittenState),
-    Disturb { effort: Vec<f64>, duration: f64 },
-    Period(WrittenPeriod),
-    State(WrittenState),
-    Command(Vec<f64>),
-    Drive(Option<Vec<f64>>),
-    Reset,
-    Diverged,
-}
-
-#[derive(Serialize, Deserialize)]
-struct WrittenArm {
-    gravity: f64,
-    masses: Vec<f64>,
-    lengths: Vec<f64>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct WrittenGains {
-    kp: Vec<f64>,
-    ki: Vec<f64>,
-    kd: Vec<f64>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct WrittenState {
-    position: Vec<f64>,
-    velocity: Vec<f64>,
-}
-
-#[derive(Serialize, Deserialize, Clone, Copy)]
-struct WrittenPeriod {
-    period: f64,
-    delay: bool,
-}
-
-#[derive(Serialize, Deserialize)]
-struct WrittenHeld {
-    period: WrittenPeriod,
-    due: u64,
-    effort: Vec<f64>,
-    computed: Vec<f64>,
-    command: Vec<f64>,
-    driven: Option<Vec<f64>>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct WrittenCheckpoint {
-    links: usize,
-    params: WrittenArm,
-    gains: WrittenGains,
-    setpoint: WrittenState,
-    integral: Vec<f64>,
-    enabled: bool,
-    #[serde(default)]
-    held: Option<WrittenHeld>,
-    method: String,
-    timestep: f64,
-    state: WrittenState,
-    carry: WrittenState,
-    effort: Vec<f64>,
-    disturbance: Option<(Vec<f64>, f64)>,
-    base: f64,
-    steps_since_base: u64,
-    steps: u64,
-    divergence: Option<(u64, f64)>,
-}
+// ---- writing --------------------------------------------------------------------------------------------------------
 
 /// The note as text.
 #[must_use]
 pub fn write_note<const N: usize>(note: &Note<N>) -> String {
     let written = match note {
-        Note::Begin(checkpoint) => Written::Begin(Box::new(checkpoint.as_ref().into())),
-        Note::Diverged => Written::Diverged,
+        Note::Begin(checkpoint) => json!({"begin": write_checkpoint(checkpoint)}),
+        Note::Diverged => json!("diverged"),
         Note::Input(input) => match input {
-            ArmInput::Method(method) => Written::Method(method.name().to_owned()),
-            ArmInput::Timestep(timestep) => Written::Timestep(*timestep),
-            ArmInput::Arm(arm) => Written::Params(arm.into()),
-            ArmInput::Gains(gains) => Written::Gains(gains.into()),
-            ArmInput::Enabled(on) => Written::Enable(*on),
-            ArmInput::Setpoint(setpoint) => Written::Setpoint(setpoint.into()),
-            ArmInput::Disturbance { effort, duration } => Written::Disturb {
-                effort: effort.to_vec(),
-                duration: *duration,
-            },
-            ArmInput::Period(period) => Written::Period((*period).into()),
-            ArmInput::State(state) => Written::State(state.into()),
-            ArmInput::Command(effort) => Written::Command(effort.to_vec()),
-            ArmInput::Drive(effort) => Written::Drive(effort.map(|effort| effort.to_vec())),
-            ArmInput::Reset => Written::Reset,
+            ArmInput::Method(method) => json!({"method": method.name()}),
+            ArmInput::Timestep(timestep) => json!({"timestep": timestep}),
+            ArmInput::Arm(arm) => json!({"params": write_arm(arm)}),
+            ArmInput::Gains(gains) => json!({"gains": write_gains(gains)}),
+            ArmInput::Enabled(on) => json!({"enable": on}),
+            ArmInput::Setpoint(Setpoint { position, velocity }) => {
+                json!({"setpoint": write_motion(position, velocity)})
+            }
+            ArmInput::Disturbance { effort, duration } => {
+                json!({"disturb": {"effort": effort.as_slice(), "duration": duration}})
+            }
+            ArmInput::Period(period) => json!({"period": write_period(period)}),
+            ArmInput::State(state) => json!({"state": write_state(state)}),
+            ArmInput::Command(effort) => json!({"command": effort.as_slice()}),
+            ArmInput::Drive(effort) => json!({"drive": effort.as_ref().map(<[f64; N]>::as_slice)}),
+            ArmInput::Reset => json!("reset"),
         },
     };
-    serde_json::to_string(&written).unwrap_or_default()
+    written.to_string()
 }
+
+fn write_checkpoint<const N: usize>(from: &Checkpoint<N>) -> Value {
+    let held = &from.held;
+    let disturbance = from.disturbance.as_ref();
+    json!({
+        "links": N,
+        "params": write_arm(&from.arm),
+        "gains": write_gains(&from.gains),
+        "setpoint": write_motion(&from.setpoint.position, &from.setpoint.velocity),
+        "integral": from.integral.as_slice(),
+        "enabled": from.enabled,
+        "held": {
+            "period": write_period(&held.period),
+            "due": held.due,
+            "effort": held.effort.as_slice(),
+            "computed": held.computed.as_slice(),
+            "command": held.command.as_slice(),
+            "driven": held.driven.as_ref().map(<[f64; N]>::as_slice),
+        },
+        "method": from.method.name(),
+        "timestep": from.timestep,
+        "state": write_state(&from.state),
+        "carry": write_state(&from.carry),
+        "effort": from.effort.as_slice(),
+        "disturbance": disturbance.map(|(effort, ends)| (effort.as_slice(), ends)),
+        "base": from.base,
+        "steps_since_base": from.steps_since_base,
+        "steps": from.steps,
+        "divergence": from.divergence,
+    })
+}
+
+fn write_arm<const N: usize>(arm: &Arm<N>) -> Value {
+    let (masses, lengths) = (arm.masses().as_slice(), arm.lengths().as_slice());
+    json!({"gravity": arm.gravity(), "masses": masses, "lengths": lengths})
+}
+
+fn write_gains<const N: usize>(gains: &Gains<N>) -> Value {
+    let [kp, ki, kd] = [&gains.kp, &gains.ki, &gains.kd].map(<[f64; N]>::as_slice);
+    json!({"kp": kp, "ki": ki, "kd": kd})
+}
+
+fn write_period(ControlPeriod { period, delay }: &ControlPeriod) -> Value {
+    json!({"period": period, "delay": delay})
+}
+
+fn write_state<const N: usize>(state: &State<N>) -> Value {
+    write_motion(&state.position, &state.velocity)
+}
+
+fn write_motion(position: &[f64], velocity: &[f64]) -> Value {
+    json!({"position": position, "velocity": velocity})
+}
+
+// ---- reading --------------------------------------------------------------------------------------------------------
 
 /// The number of links in a note with the whole simulation; `None` for any other note.
 #[must_use]
-pub fn links(note: &str) -> Option<usize> {
-    match serde_json::from_str(note) {
-        Ok(Written::Begin(checkpoint)) => Some(checkpoint.links),
-        _ => None,
-    }
+pub fn links(note: &str) -> Option<u64> {
+    let note: Value = serde_json::from_str(note).ok()?;
+    note.pointer("/begin/links")?.as_u64()
 }
 
 /// Reads a note.
@@ -162,217 +143,156 @@ pub fn links(note: &str) -> Option<usize> {
 /// # Errors
 /// If it is not a note, or not for an arm of `N` links.
 pub fn read_note<const N: usize>(note: &str) -> Result<Note<N>, NoteError> {
-    let input = match serde_json::from_str(note)? {
-        Written::Begin(checkpoint) => return Ok(Note::Begin(Box::new(checkpoint.read()?))),
-        Written::Diverged => return Ok(Note::Diverged),
-        Written::Method(name) => ArmInput::Method(method(name)?),
-        Written::Timestep(timestep) => ArmInput::Timestep(checked(timestep)?),
-        Written::Params(arm) => ArmInput::Arm(arm.read()?),
-        Written::Gains(gains) => ArmInput::Gains(gains.read()?),
-        Written::Enable(on) => ArmInput::Enabled(on),
-        Written::Setpoint(setpoint) => ArmInput::Setpoint(setpoint.setpoint()?),
-        Written::Disturb { effort, duration } => ArmInput::Disturbance {
-            effort: array("effort", &effort)?,
-            duration,
-        },
-        Written::Period(period) => ArmInput::Period(period.read()?),
-        Written::State(state) => ArmInput::State(state.state()?),
-        Written::Command(effort) => ArmInput::Command(array("command", &effort)?),
-        Written::Drive(effort) => {
-            ArmInput::Drive(effort.map(|one| array("drive", &one)).transpose()?)
-        }
-        Written::Reset => ArmInput::Reset,
+    let note: Value = serde_json::from_str(note)?;
+    let members = note.as_object().filter(|members| members.len() == 1);
+    let (kind, value) = match members.and_then(|members| members.iter().next()) {
+        Some((kind, value)) => (kind.as_str(), value),
+        None => (note.as_str().unwrap_or_default(), &Value::Null),
     };
-    Ok(Note::Input(input))
+    Ok(Note::Input(match kind {
+        "begin" => return Ok(Note::Begin(Box::new(read_checkpoint(value)?))),
+        "diverged" => return Ok(Note::Diverged),
+        "method" => ArmInput::Method(read_method(value)?),
+        "timestep" => ArmInput::Timestep(timestep(value)?),
+        "params" => ArmInput::Arm(read_arm(value)?),
+        "gains" => ArmInput::Gains(read_gains(value)?),
+        "enable" => ArmInput::Enabled(flag("enable", value)?),
+        "setpoint" => ArmInput::Setpoint(read_setpoint(value)?),
+        "disturb" => ArmInput::Disturbance {
+            effort: array("effort", &value["effort"])?,
+            duration: number("duration", &value["duration"])?,
+        },
+        "period" => ArmInput::Period(read_period(value)?),
+        "state" => ArmInput::State(read_state(value)?),
+        "command" => ArmInput::Command(array("command", value)?),
+        "drive" => ArmInput::Drive(optional(value, |value| array("drive", value))?),
+        "reset" => ArmInput::Reset,
+        other => return Err(NoteError::Kind(other.to_owned())),
+    }))
 }
 
-fn array<const N: usize>(field: &'static str, values: &[f64]) -> Result<[f64; N], NoteError> {
-    let why = NoteError::Field(field, "have one number per joint");
-    values.try_into().map_err(|_| why)
+fn read_checkpoint<const N: usize>(from: &Value) -> Result<Checkpoint<N>, NoteError> {
+    let held = optional(&from["held"], read_held)?;
+    Ok(Checkpoint {
+        arm: read_arm(&from["params"])?,
+        gains: read_gains(&from["gains"])?,
+        setpoint: read_setpoint(&from["setpoint"])?,
+        integral: array("integral", &from["integral"])?,
+        enabled: flag("enabled", &from["enabled"])?,
+        held: held.unwrap_or_default(),
+        method: read_method(&from["method"])?,
+        timestep: timestep(&from["timestep"])?,
+        state: read_state(&from["state"])?,
+        carry: read_state(&from["carry"])?,
+        effort: array("effort", &from["effort"])?,
+        disturbance: optional(&from["disturbance"], |one| {
+            Ok((
+                array("disturbance", &one[0])?,
+                number("disturbance", &one[1])?,
+            ))
+        })?,
+        base: number("base", &from["base"])?,
+        steps_since_base: steps("steps_since_base", &from["steps_since_base"])?,
+        steps: steps("steps", &from["steps"])?,
+        divergence: optional(&from["divergence"], |one| {
+            Ok((
+                steps("divergence", &one[0])?,
+                number("divergence", &one[1])?,
+            ))
+        })?,
+    })
 }
 
-fn method(name: String) -> Result<Method, NoteError> {
-    let found = Method::ALL.into_iter().find(|one| one.name() == name);
-    found.ok_or(NoteError::Method(name))
+fn read_held<const N: usize>(from: &Value) -> Result<Held<N>, NoteError> {
+    Ok(Held {
+        period: read_period(&from["period"])?,
+        due: steps("due", &from["due"])?,
+        effort: array("effort", &from["effort"])?,
+        computed: array("computed", &from["computed"])?,
+        command: array("command", &from["command"])?,
+        driven: optional(&from["driven"], |value| array("driven", value))?,
+    })
 }
 
-/// A number of steps, which must be exact as a `float64`. A run takes years to exceed that.
-fn counted(field: &'static str, steps: u64) -> Result<u64, NoteError> {
-    const MOST: u64 = 1 << 53;
-    let why = NoteError::Field(field, "be at most 2^53");
-    (steps <= MOST).then_some(steps).ok_or(why)
+fn read_arm<const N: usize>(from: &Value) -> Result<Arm<N>, NoteError> {
+    let lengths = array("lengths", &from["lengths"])?;
+    let masses = array("masses", &from["masses"])?;
+    Ok(Arm::new(
+        lengths,
+        masses,
+        number("gravity", &from["gravity"])?,
+    )?)
 }
 
-fn checked(timestep: f64) -> Result<f64, NoteError> {
-    let valid = timestep.is_finite() && timestep > 0.0;
-    let why = NoteError::Field("the timestep", "be greater than 0");
-    valid.then_some(timestep).ok_or(why)
+fn read_gains<const N: usize>(from: &Value) -> Result<Gains<N>, NoteError> {
+    Ok(Gains {
+        kp: array("kp", &from["kp"])?,
+        ki: array("ki", &from["ki"])?,
+        kd: array("kd", &from["kd"])?,
+    })
 }
 
-impl From<ControlPeriod> for WrittenPeriod {
-    fn from(ControlPeriod { period, delay }: ControlPeriod) -> Self {
-        Self { period, delay }
-    }
+fn read_period(from: &Value) -> Result<ControlPeriod, NoteError> {
+    let period = number("period", &from["period"])?;
+    let delay = flag("delay", &from["delay"])?;
+    let why = NoteError::Field("the control period", "not be negative");
+    (period >= 0.0)
+        .then_some(ControlPeriod { period, delay })
+        .ok_or(why)
 }
 
-impl WrittenPeriod {
-    fn read(self) -> Result<ControlPeriod, NoteError> {
-        let Self { period, delay } = self;
-        let valid = period.is_finite() && period >= 0.0;
-        let why = NoteError::Field("the control period", "not be negative");
-        valid.then_some(ControlPeriod { period, delay }).ok_or(why)
-    }
+fn read_state<const N: usize>(from: &Value) -> Result<State<N>, NoteError> {
+    Ok(State {
+        position: array("position", &from["position"])?,
+        velocity: array("velocity", &from["velocity"])?,
+    })
 }
 
-impl<const N: usize> From<&Held<N>> for WrittenHeld {
-    fn from(held: &Held<N>) -> Self {
-        Self {
-            period: held.period.into(),
-            due: held.due,
-            effort: held.effort.to_vec(),
-            computed: held.computed.to_vec(),
-            command: held.command.to_vec(),
-            driven: held.driven.map(|effort| effort.to_vec()),
-        }
-    }
+fn read_setpoint<const N: usize>(from: &Value) -> Result<Setpoint<N>, NoteError> {
+    let State { position, velocity } = read_state(from)?;
+    Ok(Setpoint { position, velocity })
 }
 
-impl WrittenHeld {
-    fn read<const N: usize>(&self) -> Result<Held<N>, NoteError> {
-        let driven = self.driven.as_ref().map(|one| array("driven", one));
-        Ok(Held {
-            period: self.period.read()?,
-            due: counted("due", self.due)?,
-            effort: array("effort", &self.effort)?,
-            computed: array("computed", &self.computed)?,
-            command: array("command", &self.command)?,
-            driven: driven.transpose()?,
-        })
-    }
+fn read_method(from: &Value) -> Result<Method, NoteError> {
+    let found = Method::ALL.into_iter().find(|one| *from == one.name());
+    found.ok_or(NoteError::Field("method", "be the name of a method"))
 }
 
-impl WrittenArm {
-    fn read<const N: usize>(&self) -> Result<Arm<N>, NoteError> {
-        let (lengths, masses) = (
-            array("lengths", &self.lengths)?,
-            array("masses", &self.masses)?,
-        );
-        Ok(Arm::new(lengths, masses, self.gravity)?)
-    }
+/// The value, if it is not `null`.
+fn optional<T>(
+    value: &Value,
+    read: impl FnOnce(&Value) -> Result<T, NoteError>,
+) -> Result<Option<T>, NoteError> {
+    Some(value)
+        .filter(|value| !value.is_null())
+        .map(read)
+        .transpose()
 }
 
-impl<const N: usize> From<&Arm<N>> for WrittenArm {
-    fn from(arm: &Arm<N>) -> Self {
-        Self {
-            gravity: arm.gravity(),
-            masses: arm.masses().to_vec(),
-            lengths: arm.lengths().to_vec(),
-        }
-    }
+fn array<const N: usize>(name: &'static str, values: &Value) -> Result<[f64; N], NoteError> {
+    let values = values.as_array().and_then(|values| {
+        let numbers = values.iter().map(Value::as_f64);
+        numbers.collect::<Option<Vec<_>>>()?.try_into().ok()
+    });
+    values.ok_or(NoteError::Field(name, "have one number per joint"))
 }
 
-impl WrittenGains {
-    fn read<const N: usize>(&self) -> Result<Gains<N>, NoteError> {
-        Ok(Gains {
-            kp: array("kp", &self.kp)?,
-            ki: array("ki", &self.ki)?,
-            kd: array("kd", &self.kd)?,
-        })
-    }
+fn number(name: &'static str, value: &Value) -> Result<f64, NoteError> {
+    value.as_f64().ok_or(NoteError::Field(name, "be a number"))
 }
 
-impl<const N: usize> From<&Gains<N>> for WrittenGains {
-    fn from(gains: &Gains<N>) -> Self {
-        Self {
-            kp: gains.kp.to_vec(),
-            ki: gains.ki.to_vec(),
-            kd: gains.kd.to_vec(),
-        }
-    }
+fn flag(name: &'static str, value: &Value) -> Result<bool, NoteError> {
+    value
+        .as_bool()
+        .ok_or(NoteError::Field(name, "be true or false"))
 }
 
-impl WrittenState {
-    fn state<const N: usize>(&self) -> Result<State<N>, NoteError> {
-        Ok(State {
-            position: array("position", &self.position)?,
-            velocity: array("velocity", &self.velocity)?,
-        })
-    }
-
-    fn setpoint<const N: usize>(&self) -> Result<Setpoint<N>, NoteError> {
-        let State { position, velocity } = self.state()?;
-        Ok(Setpoint { position, velocity })
-    }
+fn timestep(value: &Value) -> Result<f64, NoteError> {
+    let timestep = value.as_f64().filter(|timestep| *timestep > 0.0);
+    timestep.ok_or(NoteError::Field("the timestep", "be greater than 0"))
 }
 
-impl<const N: usize> From<&Setpoint<N>> for WrittenState {
-    fn from(Setpoint { position, velocity }: &Setpoint<N>) -> Self {
-        let (position, velocity) = (position.to_vec(), velocity.to_vec());
-        Self { position, velocity }
-    }
-}
-
-impl<const N: usize> From<&State<N>> for WrittenState {
-    fn from(state: &State<N>) -> Self {
-        Self {
-            position: state.position.to_vec(),
-            velocity: state.velocity.to_vec(),
-        }
-    }
-}
-
-impl<const N: usize> From<&Checkpoint<N>> for WrittenCheckpoint {
-    fn from(from: &Checkpoint<N>) -> Self {
-        let disturbance = from.disturbance.as_ref();
-        Self {
-            links: N,
-            params: (&from.arm).into(),
-            gains: (&from.gains).into(),
-            setpoint: (&from.setpoint).into(),
-            integral: from.integral.to_vec(),
-            enabled: from.enabled,
-            held: Some((&from.held).into()),
-            method: from.method.name().to_owned(),
-            timestep: from.timestep,
-            state: (&from.state).into(),
-            carry: (&from.carry).into(),
-            effort: from.effort.to_vec(),
-            disturbance: disturbance.map(|(effort, ends)| (effort.to_vec(), *ends)),
-            base: from.base,
-            steps_since_base: from.steps_since_base,
-            steps: from.steps,
-            divergence: from.divergence,
-        }
-    }
-}
-
-impl WrittenCheckpoint {
-    fn read<const N: usize>(self) -> Result<Checkpoint<N>, NoteError> {
-        let disturbance = match &self.disturbance {
-            Some((effort, ends)) => Some((array("disturbance", effort)?, *ends)),
-            None => None,
-        };
-        let held = match &self.held {
-            Some(held) => held.read()?,
-            None => Held::default(),
-        };
-        Ok(Checkpoint {
-            arm: self.params.read()?,
-            gains: self.gains.read()?,
-            setpoint: self.setpoint.setpoint()?,
-            integral: array("integral", &self.integral)?,
-            enabled: self.enabled,
-            held,
-            method: method(self.method)?,
-            timestep: checked(self.timestep)?,
-            state: self.state.state()?,
-            carry: self.carry.state()?,
-            effort: array("effort", &self.effort)?,
-            disturbance,
-            base: self.base,
-            steps_since_base: counted("steps_since_base", self.steps_since_base)?,
-            steps: counted("steps", self.steps)?,
-            divergence: self.divergence,
-        })
-    }
+fn steps(name: &'static str, value: &Value) -> Result<u64, NoteError> {
+    let steps = value.as_u64().filter(|steps| *steps <= MAX_STEPS);
+    steps.ok_or(NoteError::Field(name, "be at most 2^53"))
 }

@@ -22,18 +22,7 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 pub struct Solve<const N: usize>(pub Target);
 
 impl<const N: usize> Ask for Solve<N> {
-    type Answer = Result<[f64; N], SolveError>;
-}
-
-/// Why there is no solution.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum SolveError {
-    /// Out of the arm's reach.
-    #[error(transparent)]
-    Unreachable(#[from] Unreachable),
-    /// The arm's actor has ended.
-    #[error("{} does not answer", Node::ArmSim.name())]
-    NoArm,
+    type Answer = Result<[f64; N], Unreachable>;
 }
 
 impl<const N: usize> Callable for Solve<N> {
@@ -46,7 +35,7 @@ impl<const N: usize> Callable for Solve<N> {
 }
 
 impl<const N: usize> Answered for Solve<N> {
-    fn write(answer: Result<[f64; N], SolveError>, to: &Address) -> Bytes {
+    fn write(answer: Result<[f64; N], Unreachable>, to: &Address) -> Bytes {
         to.outcome(answer.map(|positions| json!({"positions": positions.to_vec()})))
     }
 }
@@ -81,24 +70,21 @@ pub fn target_message(target: &Target) -> TargetMessage {
 
 // ---- goals ----------------------------------------------------------------------------------------------------------
 
-/// The fields of a goal.
+/// A goal of a client. The answer is its id, sent before its trajectory is published.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GoalRequest {
+pub struct GoalRequest<const N: usize> {
     /// The target.
     pub target: Target,
     /// The condition for success.
     pub criteria: Criteria,
 }
 
-impl GoalRequest {
-    /// Reads a goal for an arm of `N` links.
-    ///
-    /// # Errors
-    /// All rejected fields, by name.
-    pub fn read<const N: usize>(
-        service: Service,
-        arguments: &Arguments,
-    ) -> Result<Self, Rejections> {
+impl<const N: usize> Ask for GoalRequest<N> {
+    type Answer = Result<String, GoalRejected>;
+}
+
+impl<const N: usize> Callable for GoalRequest<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let target = read_target::<N>(&mut fields);
         let epsilon = fields.number("epsilon", Bound::Positive);
@@ -115,11 +101,11 @@ impl GoalRequest {
             }),
         }
     }
+}
 
-    /// Writes the response: the id of the accepted goal.
-    #[must_use]
-    pub fn write(answer: &Result<String, GoalRejected>, to: &Address) -> Bytes {
-        to.outcome(answer.as_ref().map(|goal_id| json!({"goal_id": goal_id})))
+impl<const N: usize> Answered for GoalRequest<N> {
+    fn write(answer: Result<String, GoalRejected>, to: &Address) -> Bytes {
+        to.outcome(answer.map(|goal_id| json!({"goal_id": goal_id})))
     }
 }
 
@@ -128,36 +114,33 @@ impl GoalRequest {
 pub enum GoalRejected {
     /// There is no solution.
     #[error(transparent)]
-    Unsolved(#[from] SolveError),
-    /// A node has ended.
-    #[error("{0} does not answer")]
-    NoAnswer(
-        /// Its name.
-        &'static str,
-    ),
+    Unsolved(#[from] Unreachable),
+    /// The arm's actor has ended.
+    #[error("{} does not answer", Node::ArmSim.name())]
+    NoAnswer,
 }
 
-/// The fields of a cancellation.
+/// Preempts a goal if it is the active one. Answered after its result has been published.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CancelRequest {
-    /// The id of the goal, if the request has one.
+    /// The id of the goal; `None` for the active one.
     pub goal_id: Option<String>,
 }
 
-impl CancelRequest {
-    /// Reads a cancellation.
-    ///
-    /// # Errors
-    /// All rejected fields, by name.
-    pub fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+impl Ask for CancelRequest {
+    type Answer = Result<(), CancelRejected>;
+}
+
+impl Callable for CancelRequest {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let goal_id = fields.text("goal_id").map(std::borrow::Cow::into_owned);
         fields.accept(Self { goal_id })
     }
+}
 
-    /// Writes the response.
-    #[must_use]
-    pub fn write(answer: Result<(), CancelRejected>, to: &Address) -> Bytes {
+impl Answered for CancelRequest {
+    fn write(answer: Result<(), CancelRejected>, to: &Address) -> Bytes {
         to.outcome(answer.map(|()| Empty {}))
     }
 }

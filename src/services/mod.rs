@@ -7,6 +7,7 @@
 pub mod arm;
 pub mod goals;
 pub mod study;
+pub mod trajectory;
 pub mod trial;
 
 use bytes::Bytes;

@@ -11,9 +11,8 @@ use crate::stage::{
 };
 use crate::system::{counting_wake_ups, in_virtual_time};
 use actix::prelude::*;
-use pendularm::actors::arm::ik::{Ik, SolveError};
 use pendularm::actors::arm::ik_action::{
-    CancelGoal, CancelRejected, GoalOwner, GoalRejected, GoalReport, IkAction, SendGoal,
+    CancelRejected, CancelRequest, GoalRejected, GoalReport, IkAction, SendGoal,
 };
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, TrialRequest};
 use pendularm::actors::arm::sim::{ArmPose, Pose};
@@ -26,7 +25,7 @@ use pendularm::math::kinematics::{Target, Unreachable};
 use pendularm::math::trial::Changes;
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::op::fields::Rejections;
-use serde_json::{Value, json};
+use serde_json::Value;
 use tokio::sync::mpsc::unbounded_channel;
 use tokio::time::Instant;
 
@@ -70,16 +69,12 @@ struct Script {
 impl Script {
     /// The answer of `ik_action` to a goal.
     fn accept(&mut self, goal: SendGoal<2>) -> Result<String, GoalRejected> {
-        self.sent.push(goal.target);
+        self.sent.push(goal.goal.target);
         if self.refusals > 0 {
             self.refusals -= 1;
-            let why = SolveError::Unreachable(Unreachable::NotFinite("x"));
-            return Err(GoalRejected::Unsolved(why));
+            return Err(GoalRejected::Unsolved(Unreachable::NotFinite("x")));
         }
-        self.owner = match goal.owner {
-            Some(GoalOwner::Node(owner)) => Some(owner),
-            _ => None,
-        };
+        self.owner = Some(goal.owner);
         Ok(format!("goal-{}", self.sent.len()))
     }
 }
@@ -110,7 +105,7 @@ async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Addr<IkTrial<2>>, C
             let answer = of_goals.borrow_mut().accept(call.ask);
             call.reply.conclude(answer);
         }),
-        cancel: stand_in(|call: Call<CancelGoal>| {
+        cancel: stand_in(|call: Call<CancelRequest>| {
             call.reply.conclude(Err(CancelRejected::NotActive));
         }),
         barrier: stand_in(move |_: Barrier| {
@@ -184,8 +179,7 @@ fn no_status_is_encoded_without_a_subscriber() {
     in_virtual_time(async {
         let (sender, mut published) = unbounded_channel();
         let publish = publisher(sender);
-        let ik = Ik::<2>::new(silent_arm()).start();
-        let action = IkAction::new(ik.recipient(), silent_tracker(), publish.clone()).start();
+        let action = IkAction::<2>::new(silent_tracker(), publish.clone()).start();
         let goals = GoalClient {
             send: action.clone().recipient(),
             cancel: action.clone().recipient(),
@@ -219,7 +213,6 @@ fn no_timer_runs_without_a_goal_a_trial_or_a_subscriber() {
         let (action, trial) = start_goal_nodes::<2>(arm, tracker, &registry, 1, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
         let mut client = connect(&registry, &gauges);
-        client.ask("/ik/solve", json!({"x": 1, "y": 1})).await;
         let an_hour = || async {
             let before = sleeps.load(Ordering::Relaxed);
             pass(ms(3_600_000)).await;

@@ -16,7 +16,6 @@ mod exchanges;
 #[cfg(feature = "web")]
 #[path = "../support/folder.rs"]
 mod folder;
-mod ik;
 mod ik_action;
 mod ik_trial;
 mod integration;

@@ -5,8 +5,11 @@
 
 use std::cell::RefCell;
 use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+use crate::stage::Stage;
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Node, WIDE, settle};
 use pendularm::actors::gateway::messages::Publish;
@@ -111,5 +114,24 @@ fn a_trajectory_has_taken_effect_before_its_senders_next_frame_is_taken() {
         assert_eq!(held.borrow().len(), 1);
         held.borrow_mut().clear();
         assert_eq!(client.receive().await["id"], 1);
+    });
+}
+
+/// The nodes of goals leave this to the registry.
+#[test]
+fn a_message_of_a_node_is_made_only_if_its_topic_has_a_subscriber() {
+    in_virtual_time(async {
+        let stage = Stage::<2>::start().await;
+        let mut client = stage.connect();
+        let made = Arc::new(AtomicUsize::new(0));
+        for expected in [0, 1] {
+            let count = Arc::clone(&made);
+            let message = Publish::made(Topic::IkResult, move || {
+                count.fetch_add(1, Ordering::Relaxed)
+            });
+            stage.registry.send(message).await.unwrap();
+            assert_eq!(made.load(Ordering::Relaxed), expected);
+            client.subscribe(Topic::IkResult.name()).await;
+        }
     });
 }

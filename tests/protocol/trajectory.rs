@@ -1,23 +1,23 @@
 //! The setpoint that a `/joint_trajectory` message sets.
 //!
-//! **Invariant:** the joints are named as a 3-link arm's or a 2-link arm's are.
+//! **Invariant:** the joints are named as a 3-link arm's are.
 
+use pendularm::math::pid::Setpoint;
 use pendularm::protocol::op::fields::RejectedField;
-use pendularm::protocol::op::trajectory::{SetpointRequest, joint_trajectory};
+use pendularm::protocol::wire::json::Payload;
+use pendularm::services::trajectory::read_setpoint;
 use proptest::prelude::*;
 use serde_json::value::RawValue;
 
 const JOINTS: [&str; 3] = ["joint1", "joint2", "joint3"];
 
-fn read(msg: &str) -> Result<SetpointRequest, RejectedField> {
-    joint_trajectory(
-        &RawValue::from_string(msg.to_owned()).expect("valid JSON"),
-        &JOINTS,
-    )
+fn read(msg: &str) -> Result<Setpoint<3>, RejectedField> {
+    let msg = RawValue::from_string(msg.to_owned()).expect("valid JSON");
+    read_setpoint(&Payload::from(msg))
 }
 
 /// The setpoint of a message with one point.
-fn setpoint(names: &str, positions: &str, velocities: &str) -> SetpointRequest {
+fn setpoint(names: &str, positions: &str, velocities: &str) -> Setpoint<3> {
     let msg = format!(
         r#"{{"joint_names":{names},"points":[{{"positions":{positions},"velocities":{velocities}}}]}}"#
     );

@@ -19,6 +19,8 @@ use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::Registry;
 use pendularm::actors::node::{Ask, Call, Publish, Reply, guard};
 use pendularm::actors::resources::gauges::Gauges;
+use pendularm::math::arm::State;
+use pendularm::math::kinematics::Unreachable;
 use pendularm::math::pid::Setpoint;
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::Topic;
@@ -160,10 +162,12 @@ where
 pub fn pose_at(time: f64) -> Pose<2> {
     Pose {
         lengths: [1.0, 1.0],
-        positions: [0.0, 0.0],
+        state: State::rest(),
+        setpoint: Setpoint::default(),
         time,
         resets: 0,
         simulated: time,
+        stands_still: false,
         obstacle: None,
     }
 }
@@ -179,17 +183,16 @@ pub fn silent_tracker() -> GoalTracker<2> {
         track: stand_in(accept),
         command: stand_in(|_| ()),
         end: stand_in(|_| None),
-        add_barrier: stand_in(|_| ()),
     }
 }
 
 /// The answer of an arm that has accepted a goal.
-pub fn accept(TrackGoal { goal, .. }: TrackGoal<2>) -> Tracking<2> {
-    Tracking {
-        positions: goal.solution,
+pub fn accept(_: TrackGoal<2>) -> Result<Tracking<2>, Unreachable> {
+    Ok(Tracking {
+        positions: [0.0, 1.5],
         before: None,
         obstacle: None,
-    }
+    })
 }
 
 /// Receives what nodes publish in place of the registry: messages without subscribers are kept, too.

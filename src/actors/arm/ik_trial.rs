@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use actix::prelude::*;
 
-use super::ik_action::{CancelGoal, GoalOwner, GoalReport, GoalSelector, SendGoal};
+use super::ik_action::{CancelRequest, GoalReport, GoalRequest, SendGoal};
 use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Barrier, Call, Interest, Publish, Reply, Unserved, ask};
 use crate::actors::wire::Nodes;
@@ -330,7 +330,7 @@ pub struct GoalClient<const N: usize> {
     /// Sends a goal.
     pub send: Recipient<Call<SendGoal<N>>>,
     /// Cancels it.
-    pub cancel: Recipient<Call<CancelGoal>>,
+    pub cancel: Recipient<Call<CancelRequest>>,
     /// Waits until all earlier news have arrived.
     pub barrier: Recipient<Barrier>,
 }
@@ -355,9 +355,9 @@ async fn carry_out<const N: usize>(
     for command in commands {
         match command {
             TrialCommand::CancelGoal { goal_id } => {
-                let goal = GoalSelector::ById(goal_id);
+                let goal_id = Some(goal_id);
                 // A refusal means that the goal has already ended, as wanted.
-                let _ = ask(&goals.cancel, CancelGoal { goal }).await;
+                let _ = ask(&goals.cancel, CancelRequest { goal_id }).await;
             }
             TrialCommand::SendGoal {
                 ticket,
@@ -365,9 +365,8 @@ async fn carry_out<const N: usize>(
                 criteria,
             } => {
                 let goal = SendGoal {
-                    target,
-                    criteria,
-                    owner: Some(GoalOwner::Node(owner.clone())),
+                    goal: GoalRequest { target, criteria },
+                    owner: owner.clone(),
                 };
                 let goal_id = ask(&goals.send, goal).await.ok().and_then(Result::ok);
                 let lengths = match goal_id {

@@ -6,18 +6,18 @@
 //!
 //! **Invariant:** a call is answered once, and blocks neither the arm nor another client.
 
-use std::time::Instant;
+use std::time::Duration;
 
 use actix::prelude::*;
 use tokio::sync::oneshot;
 
 use super::answering::answer;
-use super::workers::{Computation, Progress, WorkerPool};
+use super::workers::WorkerPool;
 use crate::actors::arm::sim::{ArmSettings, HeldLimit};
-use crate::actors::node::{Call, Unserved};
+use crate::actors::node::{Call, Reply, Unserved};
 use crate::actors::wire::Nodes;
 use crate::protocol::catalog::{Node, Service};
-use crate::services::study::{Computed, Integrating};
+use crate::services::study::{Computed, Integrating, Work};
 pub use crate::services::study::{
     IntegrationStep, PlanRun, PlannedRun, PredictStability, Predicted, Ran, Refused, RunOffline,
     SuggestGains, Suggested,
@@ -85,33 +85,23 @@ impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
     type Result = ResponseFuture<Option<ClockLimits>>;
 
     fn handle(&mut self, HeldLimit(control): HeldLimit<N>, _: &mut Context<Self>) -> Self::Result {
-        let (answer, answered) = oneshot::channel();
-        let answer = Some(answer);
-        self.workers.submit(Box::new(Limiting { control, answer }));
-        Box::pin(async move { answered.await.ok() })
+        let (asker, answered) = oneshot::channel();
+        answer(&self.workers, Reply::new(asker, None), Limiting(control));
+        Box::pin(async move { answered.await.ok()?.ok() })
     }
 }
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 /// The arm's request for its limit: one slice.
-struct Limiting<const N: usize> {
-    control: ControlLoop<N>,
-    /// The sender of the answer. If it is dropped unused, there is no answer.
-    answer: Option<oneshot::Sender<ClockLimits>>,
-}
+struct Limiting<const N: usize>(ControlLoop<N>);
 
-impl<const N: usize> Computation for Limiting<N> {
-    fn advance(&mut self, _: Instant) -> Progress {
-        let limits = clock_limits(&self.control);
-        if let Some(answer) = self.answer.take() {
-            // The arm may have ended meanwhile.
-            let _ = answer.send(limits);
-        }
-        Progress::Finished
+impl<const N: usize> Work<ClockLimits> for Limiting<N> {
+    fn most_bytes(&self) -> usize {
+        0
     }
 
-    fn refuse(&mut self, _: &'static str) {
-        self.answer = None;
+    fn advance(&mut self, _: fn() -> Duration) -> Option<ClockLimits> {
+        Some(clock_limits(&self.0))
     }
 }

@@ -5,9 +5,8 @@
 mod clock;
 pub mod limits;
 pub mod listeners;
-mod messages;
+mod requests;
 mod tape;
-mod wire;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,13 +16,15 @@ use tokio::sync::oneshot;
 
 use self::clock::TapeClock;
 use self::limits::MAX_RECORD_BYTES;
-pub use self::messages::{
+pub use self::requests::{
     EndRecord, NotRecorded, RecordTo, Recorded, StartRecording, StopRecording,
 };
 use self::tape::{Begun, TapeTarget};
 use crate::actors::arm::sim::SetListener;
 use crate::actors::gateway::messages::SetTap;
 use crate::actors::node::Call;
+use crate::actors::wire::Nodes;
+use crate::protocol::catalog::Service;
 use crate::record::RunSettings;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -66,6 +67,12 @@ impl<const N: usize> Recorder<N> {
             current: None,
             begun: 0,
         }
+    }
+
+    /// Adds this node's services to the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        nodes.serve::<StartRecording>(Service::RecorderStart, address.clone());
+        nodes.serve::<StopRecording>(Service::RecorderStop, address.clone());
     }
 }
 

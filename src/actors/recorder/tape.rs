@@ -16,7 +16,7 @@ use tokio::sync::oneshot;
 
 use super::clock::TapeClock;
 use super::limits::{FLUSH_PERIOD, MAX_RECORDS, MAX_WAITING_BYTES, MAX_WAITING_ENTRIES};
-use super::messages::{NotRecorded, Recorded};
+use super::requests::{NotRecorded, Recorded};
 use crate::record::{Content, McapWriter, RecordEntry, RecordError, RunSettings};
 
 /// The extension of a record's file name.

@@ -1,5 +1,5 @@
-//! `/rosapi/*`: the topics, services and nodes that there are, and the time. Topics and services of clients are asked
-//! of the registry, the time of the arm. The arm answers questions about its parameters.
+//! `/rosapi/*`: the topics, services and nodes that there are. Topics and services of clients are asked of the
+//! registry. The arm answers questions about its parameters and the time.
 //!
 //! **Invariant:** nothing is kept between two questions.
 
@@ -7,16 +7,13 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
-use serde_json::json;
 use tokio::time::sleep;
 
-use crate::actors::arm::sim::SimulationTime;
 use crate::actors::gateway::messages::TakeCensus;
-use crate::actors::node::{Ask, Call, Unserved};
+use crate::actors::node::{Ask, Call};
 use crate::actors::resources::long_work::{WorkKind, WorkPermit};
 use crate::actors::wire::{Address, Answered, Callable, Nodes};
-use crate::protocol::catalog::{Node, Rosapi, Service};
-use crate::protocol::messages::Stamp;
+use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
 use crate::protocol::ros::rosapi::{self, Census};
@@ -29,25 +26,20 @@ const ROOM_RETRY: Duration = Duration::from_millis(10);
 /// The node `rosapi`.
 pub struct RosapiNode {
     registry: Recipient<TakeCensus>,
-    time: Recipient<SimulationTime>,
 }
 
 impl RosapiNode {
-    /// A node that asks the registry for its clients, and the arm for the time.
+    /// A node that asks the registry for its clients.
     #[must_use]
-    pub fn new(registry: Recipient<TakeCensus>, time: Recipient<SimulationTime>) -> Self {
-        Self { registry, time }
+    pub fn new(registry: Recipient<TakeCensus>) -> Self {
+        Self { registry }
     }
 
     /// Enters this node's services into the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         for question in Rosapi::ALL {
-            let service = Service::Rosapi(question);
-            let node = address.clone();
-            match question {
-                Rosapi::GetTime => nodes.serve::<GetTime>(service, node),
-                question if question.is_about_parameters() => {}
-                _ => nodes.serve::<Look>(service, node),
+            if question != Rosapi::GetTime && !question.is_about_parameters() {
+                nodes.serve::<Look>(Service::Rosapi(question), address.clone());
             }
         }
     }
@@ -75,14 +67,6 @@ pub struct Listing {
 
 impl Ask for Look {
     type Answer = Listing;
-}
-
-/// Asks for simulation time \[s\].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct GetTime;
-
-impl Ask for GetTime {
-    type Answer = f64;
 }
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
@@ -118,19 +102,6 @@ impl Handler<Call<Look>> for RosapiNode {
     }
 }
 
-impl Handler<Call<GetTime>> for RosapiNode {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<GetTime>, ctx: &mut Context<Self>) {
-        let mut reply = call.reply;
-        let time = self.time.send(SimulationTime).into_actor(self);
-        ctx.spawn(time.map(move |time, _, _| match time {
-            Ok(time) => reply.answer(time),
-            Err(_) => reply.refuse(Unserved::NoAnswer(Node::ArmSim.name())),
-        }));
-    }
-}
-
 // ---- reading and writing --------------------------------------------------------------------------------------------
 
 impl Callable for Look {
@@ -153,21 +124,5 @@ impl Callable for Look {
 impl Answered for Look {
     fn write(Listing { look, census }: Listing, to: &Address) -> Bytes {
         to.outcome(rosapi::answer(look.question, &look.name, &census))
-    }
-}
-
-impl Callable for GetTime {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        Fields::read(arguments, service)?;
-        Ok(Self)
-    }
-}
-
-impl Answered for GetTime {
-    fn write(time: f64, to: &Address) -> Bytes {
-        let Stamp { sec, nanosec } = Stamp::from_seconds(time);
-        // ROS 1 has other names for the same; some clients know only those.
-        let time = json!({"sec": sec, "nanosec": nanosec, "secs": sec, "nsecs": nanosec});
-        to.response(&json!({"time": time}), "")
     }
 }

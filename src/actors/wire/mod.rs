@@ -6,8 +6,8 @@
 //! question, and the form of an error.
 //!
 //! **Invariant:** a node sees no JSON. Arguments are read before a node gets the call, never on the node's thread. Its
-//! answer is written afterwards, by the registry or by the thread that has a long answer. Every call is answered once:
-//! a caller that is dropped unanswered sends an error.
+//! answer is written here, on the thread that answers. Every call is answered once: a caller that is dropped
+//! unanswered sends an error.
 
 pub mod action_client;
 
@@ -24,7 +24,7 @@ use tokio::sync::oneshot;
 use self::action_client::{ActionRequest, CancelSent, ForwardGoal, Goal};
 use crate::actors::ConnectionId;
 use crate::actors::node::{
-    Asker, Call, Done, FrameKind, FrameOut, Interest, Reply, Respond, Unserved, guard,
+    Asker, Call, Done, FrameKind, Interest, Reply, Respond, Unserved, guard,
 };
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::actors::resources::memory::{Memory, NoRoom, Permit, SHORT, cover};
@@ -240,48 +240,31 @@ impl Caller {
 
     /// Answers `result: true`. The call ends when this value is dropped.
     pub fn succeed(&mut self, values: &impl Serialize) {
-        self.answer_at_once(|address| address.response(values, ""));
+        self.answer(None, |address| address.response(values, ""));
     }
 
     /// Answers `result: false` with empty values, for the reason `why`.
     pub fn refuse(&mut self, why: &str) {
-        self.answer_at_once(|address| address.failure(why));
+        self.answer(None, |address| address.failure(why));
     }
 
-    /// Answers and ends the call; `write` is called by the registry.
-    fn conclude(
-        mut self,
-        done: Option<Done>,
-        write: impl FnOnce(&Address) -> Bytes + Send + 'static,
-    ) {
-        if let Some(address) = self.address.take() {
-            let service = address.service();
-            let permit = self.permit.take();
-            let write = move || cover(permit.as_ref(), write(&address));
-            self.send(service, Box::new(write), done);
-        }
-    }
-
-    fn answer_at_once(&mut self, write: impl FnOnce(&Address) -> Bytes) {
+    /// Answers, unless that has been done.
+    fn answer(&mut self, done: Option<Done>, write: impl FnOnce(&Address) -> Bytes) {
         if let Some(address) = self.address.take() {
             let frame = cover(self.permit.as_ref(), write(&address));
-            self.send(address.service(), Box::new(move || frame), None);
+            self.registry.do_send(Respond {
+                connection: self.connection,
+                frame: Box::new(move || frame),
+                kind: FrameKind::Answer(address.service()),
+                done,
+            });
         }
-    }
-
-    fn send(&self, service: Service, frame: FrameOut, done: Option<Done>) {
-        self.registry.do_send(Respond {
-            connection: self.connection,
-            frame,
-            kind: FrameKind::Answer(service),
-            done,
-        });
     }
 }
 
 impl Drop for Caller {
     fn drop(&mut self) {
-        self.answer_at_once(|address| address.failure(&Unserved::Ended.to_string()));
+        self.refuse(&Unserved::Ended.to_string());
     }
 }
 
@@ -296,16 +279,11 @@ struct ClientAsker<T> {
 
 impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>) {
-        let Self { caller, write } = *self;
-        caller.conclude(done, move |address| match answer {
+        let Self { mut caller, write } = *self;
+        caller.answer(done, |address| match answer {
             Ok(answer) => write(answer, address),
             Err(why) => address.failure(&why.to_string()),
         });
-    }
-
-    fn answer_here(self: Box<Self>, answer: T) {
-        let Self { mut caller, write } = *self;
-        caller.answer_at_once(|address| write(answer, address));
     }
 
     fn is_gone(&self) -> bool {

@@ -369,7 +369,8 @@ impl<'a> Fields<'a> {
     }
 }
 
-pub(super) fn finite(raw: &RawValue, bound: Bound) -> Result<f64, Reason> {
+/// The finite number of a value, within `bound`.
+pub(crate) fn finite(raw: &RawValue, bound: Bound) -> Result<f64, Reason> {
     let Some(value) = json::number(raw) else {
         return Err(Reason::Mistyped {
             expected: "a number".into(),

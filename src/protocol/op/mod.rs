@@ -11,7 +11,6 @@ mod reader;
 mod rejections;
 #[cfg(feature = "runtime")]
 pub mod token;
-pub mod trajectory;
 
 use std::time::Duration;
 

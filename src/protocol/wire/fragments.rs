@@ -210,9 +210,6 @@ pub fn split(frame: &Bytes, size: usize, id: &str, most: usize) -> Option<Bytes>
         return Some(frame.clone());
     };
     let size = size.max(MIN_SIZE);
-    if least_length(text, size, id) > most {
-        return None;
-    }
     // A piece must not end inside a character, which has up to four bytes.
     let mut pieces = Vec::new();
     let mut rest = text;
@@ -240,13 +237,6 @@ pub fn split(frame: &Bytes, size: usize, id: &str, most: usize) -> Option<Bytes>
     }
     lines.shrink_to_fit();
     Some(Bytes::from(lines))
-}
-
-/// The least total bytes of a text's pieces. So pieces that would be too long are never made.
-fn least_length(text: &str, size: usize, id: &str) -> usize {
-    const SHORTEST: usize = r#"{"op":"fragment","id":"","data":"","num":0,"total":0}"#.len() + 1;
-    let escaped = text.bytes().filter(|byte| matches!(byte, b'"' | b'\\'));
-    text.len() + escaped.count() + text.len().div_ceil(size) * (SHORTEST + id.len())
 }
 
 /// The last boundary of characters at or before `at`.

@@ -1,13 +1,11 @@
-//! Messages of clients to the arm: setpoints on `/joint_trajectory`, efforts on `/effort_controller/commands`.
+//! Messages of clients to the arm: efforts on `/effort_controller/commands`. Setpoints are in
+//! [`trajectory`](crate::services::trajectory).
 //!
 //! **Invariant:** a message is taken as a whole, or refused with the reason.
 
-use crate::math::pid::Setpoint;
 use crate::protocol::catalog::Topic;
-
 use crate::protocol::op::Arguments;
-use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
-use crate::protocol::op::trajectory::joint_trajectory;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::protocol::wire::json::Payload;
 
 /// Names of the joints, base first.
@@ -17,20 +15,6 @@ const JOINT_NAMES: [&str; 3] = ["joint1", "joint2", "joint3"];
 #[must_use]
 pub fn joint_names<const N: usize>() -> [&'static str; N] {
     std::array::from_fn(|i| JOINT_NAMES.get(i).copied().unwrap_or_default())
-}
-
-/// Reads a setpoint.
-///
-/// # Errors
-/// If the message holds none for this arm.
-pub fn read_setpoint<const N: usize>(msg: &Payload) -> Result<Setpoint<N>, RejectedField> {
-    let request = joint_trajectory(msg.raw(), &joint_names::<N>())?;
-    // The reader has checked how many they are.
-    let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
-    Ok(Setpoint {
-        position: array(&request.position),
-        velocity: array(&request.velocity),
-    })
 }
 
 /// Reads the efforts \[N m\] of a `std_msgs/msg/Float64MultiArray`. Its layout is ignored.

@@ -16,12 +16,13 @@ mod reset;
 mod state;
 mod step;
 mod switches;
+mod time;
 
 pub(crate) use self::disturb::DIVERGED;
 pub use self::disturb::{Disturb, Push};
 pub use self::gains::SetGains;
 pub use self::integrator::{Integrator, SetIntegrator};
-pub use self::messages::{joint_names, read_effort, read_setpoint};
+pub use self::messages::{joint_names, read_effort};
 pub use self::parameters::{
     AskParameters, NamedParameter, NotSet, ParameterChange, ParameterRequest, ParameterValue,
     parameter_services,
@@ -32,3 +33,4 @@ pub use self::reset::Reset;
 pub use self::state::SetState;
 pub use self::step::{MAX_STEPS, STEPS_IN_A_ROW, Step, Stepped, StepsEnd};
 pub use self::switches::{Enable, Pause};
+pub use self::time::GetTime;

@@ -9,6 +9,7 @@ use glam::DVec2;
 use pendularm::actors::arm::sim::{AddBarrier, CommandGoal, GoalOrder, GoalProgress, TrackGoal};
 use pendularm::actors::node::Barrier;
 use pendularm::math::goal::Criteria;
+use pendularm::math::kinematics::Target;
 
 /// Each step of a second is reported separately, also if there are ten thousand. The next step waits until the report has
 /// been published.
@@ -48,11 +49,14 @@ fn progress_of_a_goal_is_sent_step_by_step_however_many_clients_step_the_arm() {
         let rest = [0.0; 3];
         let goal = GoalOrder {
             number: 1,
-            target: DVec2::new(0.0, 1.0),
+            target: Target {
+                position: DVec2::new(0.0, 1.0),
+                orientation: None,
+            },
             criteria: Criteria::default(),
-            solution: rest,
         };
-        bench.arm.send(TrackGoal { goal, owner }).await.unwrap();
+        let tracking = bench.arm.send(TrackGoal { goal, owner }).await;
+        assert!(tracking.unwrap().is_ok());
         let (number, positions) = (1, rest);
         let command = CommandGoal { number, positions };
         bench.arm.send(command).await.unwrap();

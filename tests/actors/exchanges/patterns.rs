@@ -14,8 +14,8 @@ use pendularm::actors::gateway::limits::{
 use pendularm::actors::ros::tf_web::{MAX_FRAME_SUBSCRIPTIONS, MAX_FRAMES};
 use pendularm::options::DEFAULT_CLIENTS;
 use pendularm::protocol::limits::{MAX_FRAME, MAX_NAME, MEDIUM, SHORT};
-use pendularm::protocol::op::trajectory::MAX_POINTS;
 use pendularm::protocol::ros::parameters::MAX_NAMED;
+use pendularm::services::trajectory::MAX_POINTS;
 #[cfg(feature = "web")]
 use pendularm::web::head::{MAX_HEAD, MAX_HEADERS};
 use serde_json::Value;

@@ -3,7 +3,6 @@
 //! **Invariant:** the runtime's own functions read a question and write its answer.
 
 use pendularm::live::ArmRequest;
-use pendularm::math::kinematics::solve;
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::messages;
 use pendularm::protocol::op::{Arguments, CallService};
@@ -16,7 +15,7 @@ use pendularm::services::study::{
     Computed, PlanRun, PredictStability, Present, RunOffline, SuggestGains, Work,
 };
 use pendularm::services::trial::TrialRequest;
-use pendularm::services::{Address, Answered, NoService};
+use pendularm::services::{Address, Answered, Callable as _, NoService};
 
 use super::Kernel;
 use super::computing::Answering;
@@ -50,11 +49,8 @@ impl<const N: usize> Kernel<N> {
             Service::SetPeriod => self.of_arm::<SetPeriod>(own, &args, &to),
             Service::Enable => self.of_arm::<Enable>(own, &args, &to),
             Service::Step => self.answer::<Step<N>>(own, &args, &to, Self::step),
-            Service::Solve => self.answer(own, &args, &to, |kernel, Solve::<N>(target)| {
-                let pose = kernel.arm.pose();
-                Ok(solve(&pose.lengths, &pose.positions, &target)?)
-            }),
-            Service::SendGoal => match GoalRequest::read::<N>(own, &args) {
+            Service::Solve => self.of_arm::<Solve<N>>(own, &args, &to),
+            Service::SendGoal => match GoalRequest::<N>::read(own, &args) {
                 Ok(goal) => self.take_goal(goal, &to),
                 Err(rejected) => self.send(to.failure(&rejected.status())),
             },

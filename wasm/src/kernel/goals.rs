@@ -5,15 +5,12 @@
 
 use pendularm::live::{GoalOrder, GoalProgress, Obstacle};
 use pendularm::math::goal::Outcome;
-use pendularm::math::kinematics::solve;
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages::goal::setpoint_trajectory;
 use pendularm::protocol::messages::{self, Level};
-use pendularm::services::Address;
 use pendularm::services::arm::joint_names;
-use pendularm::services::goals::{
-    AcceptedGoal, CancelRejected, GoalRejected, GoalRequest, SolveError,
-};
+use pendularm::services::goals::{AcceptedGoal, CancelRejected, GoalRejected, GoalRequest};
+use pendularm::services::{Address, Answered as _};
 
 use super::Kernel;
 use pendularm::live::World as _;
@@ -28,14 +25,14 @@ pub(super) struct ActiveGoal<const N: usize> {
 
 impl<const N: usize> Kernel<N> {
     /// Takes a goal of the client.
-    pub(super) fn take_goal(&mut self, goal: GoalRequest, to: &Address) {
+    pub(super) fn take_goal(&mut self, goal: GoalRequest<N>, to: &Address) {
         let begun = self.begin_goal(goal, false);
         if let Ok(Some(obstacle)) = begun {
             self.warn(to, obstacle);
         }
         let answer = begun.map(|_| self.goal_id());
-        self.send(GoalRequest::write(&answer, to));
-        if answer.is_ok() {
+        self.send(GoalRequest::<N>::write(answer, to));
+        if begun.is_ok() {
             self.set_in_motion();
         }
     }
@@ -53,20 +50,16 @@ impl<const N: usize> Kernel<N> {
     /// Solves a goal and replaces the previous one. Call [`Kernel::set_in_motion`] next.
     pub(super) fn begin_goal(
         &mut self,
-        goal: GoalRequest,
+        goal: GoalRequest<N>,
         of_trial: bool,
     ) -> Result<Option<Obstacle>, GoalRejected> {
         let GoalRequest { target, criteria } = goal;
-        let pose = self.arm.pose();
-        let solution =
-            solve(&pose.lengths, &pose.positions, &target).map_err(SolveError::Unreachable)?;
         let number = self.accepted + 1;
         let tracking = self.arm.track_goal(&GoalOrder {
             number,
-            target: target.position,
+            target,
             criteria,
-            solution,
-        });
+        })?;
         if let Some(before) = tracking.before {
             self.judge(before);
         }

@@ -22,7 +22,8 @@ use pendularm::protocol::catalog::{Direction, Topic};
 use pendularm::protocol::messages::{self, ErrorForm, Level};
 use pendularm::protocol::op::{self, Op, OpError, Verbosity};
 use pendularm::protocol::wire::json::Payload;
-use pendularm::services::arm::{read_effort, read_setpoint};
+use pendularm::services::arm::read_effort;
+use pendularm::services::trajectory::read_setpoint;
 use pendularm::study::clocks::clock_limits;
 
 use self::computing::Computation;

@@ -7,7 +7,6 @@
 //! **Invariant:** at most one goal is active, and each accepted goal has exactly one result.
 
 mod answers;
-mod wire;
 
 use std::time::Duration;
 
@@ -16,15 +15,19 @@ use actix::prelude::*;
 use self::answers::{ResultCode, feedback, result};
 #[cfg(doc)]
 use crate::actors::arm::sim::Obstacle;
-use crate::actors::arm::sim::{AddBarrier, ArmMotion, ArmSim, JointMotion, MoveSetpoint};
+use crate::actors::arm::sim::{ArmPose, MoveSetpoint, Pose};
 use crate::actors::node::{Barrier, Done, ShutDown};
-use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal};
+use crate::actors::wire::Nodes;
+use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal, Goal};
 use crate::math::arm::State;
 use crate::math::goal::{Cadence, Dwell};
 use crate::math::pid::Setpoint;
-use crate::math::trajectory::{Course, JointPath, Standing, Tolerance, Waypoint};
-use crate::protocol::op::GoalStatus;
+use crate::math::trajectory::{Course, JointPath, Standing, Waypoint};
+use crate::protocol::catalog::Action;
+use crate::protocol::op::fields::Rejections;
+use crate::protocol::op::{Arguments, GoalStatus};
 use crate::services::goals::NOT_ACTIVE;
+use crate::services::trajectory::FollowPath;
 
 /// Time between two moves of the setpoint, which the arm holds in between. At 1 rad/s the setpoint is some millimetres
 /// behind the path.
@@ -37,30 +40,11 @@ const RESET: &str = "the arm was reset";
 
 /// The node `joint_trajectory_controller` for an arm of `N` links.
 pub struct PathFollower<const N: usize> {
-    arm: PathArm<N>,
+    arm: Recipient<ArmPose<N>>,
+    setpoint: Recipient<MoveSetpoint<N>>,
     active: Option<ActivePath<N>>,
     /// The next move of the setpoint.
     timer: Option<SpawnHandle>,
-}
-
-/// The messages to the arm for paths.
-#[derive(Clone)]
-pub struct PathArm<const N: usize> {
-    motion: Recipient<ArmMotion<N>>,
-    setpoint: Recipient<MoveSetpoint<N>>,
-    add_barrier: Recipient<AddBarrier>,
-}
-
-impl<const N: usize> PathArm<N> {
-    /// The recipients of this arm.
-    #[must_use]
-    pub fn of(arm: &Addr<ArmSim<N>>) -> Self {
-        Self {
-            motion: arm.clone().recipient(),
-            setpoint: arm.clone().recipient(),
-            add_barrier: arm.clone().recipient(),
-        }
-    }
 }
 
 /// The active goal.
@@ -79,38 +63,35 @@ struct ActivePath<const N: usize> {
 impl<const N: usize> PathFollower<N> {
     /// A node without a goal.
     #[must_use]
-    pub const fn new(arm: PathArm<N>) -> Self {
+    pub const fn new(arm: Recipient<ArmPose<N>>, setpoint: Recipient<MoveSetpoint<N>>) -> Self {
         Self {
             arm,
+            setpoint,
             active: None,
             timer: None,
         }
+    }
+
+    /// Adds this node's action to the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        nodes.carry_out::<FollowPath<N>, _>(address.clone());
     }
 }
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// A path to follow.
-pub struct FollowPath<const N: usize> {
-    /// The points after the present pose.
-    pub points: Vec<Waypoint<N>>,
-    /// Tolerance on the way.
-    pub on_the_way: Tolerance<N>,
-    /// Tolerance at the end.
-    pub at_the_end: Tolerance<N>,
-    /// Time after the end in which the joints must arrive \[s\]; infinite for no limit.
-    pub patience: f64,
+impl<const N: usize> Goal for FollowPath<N> {
+    const ACTION: Action = Action::FollowJointTrajectory;
+
+    fn read(arguments: &Arguments) -> Result<Self, Rejections> {
+        Self::read(arguments)
+    }
 }
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
 
 impl<const N: usize> Actor for PathFollower<N> {
     type Context = Context<Self>;
-
-    fn started(&mut self, ctx: &mut Context<Self>) {
-        let own = ctx.address().recipient();
-        self.arm.add_barrier.do_send(AddBarrier(own));
-    }
 }
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
@@ -119,9 +100,9 @@ impl<const N: usize> Handler<ForwardGoal<FollowPath<N>>> for PathFollower<N> {
     type Result = ();
 
     fn handle(&mut self, goal: ForwardGoal<FollowPath<N>>, ctx: &mut Context<Self>) {
-        let motion = self.arm.motion.send(ArmMotion).into_actor(self);
-        ctx.wait(motion.map(|motion, node, ctx| match motion {
-            Ok(motion) => node.begin(goal, &motion, ctx),
+        let pose = self.arm.send(ArmPose).into_actor(self);
+        ctx.wait(pose.map(|pose, node, ctx| match pose {
+            Ok(pose) => node.begin(goal, &pose, ctx),
             Err(_) => goal.client.refuse("the arm does not answer"),
         }));
     }
@@ -168,8 +149,8 @@ impl<const N: usize> Handler<ShutDown> for PathFollower<N> {
 
 impl<const N: usize> ActivePath<N> {
     /// Whether the arm has been reset since the goal began.
-    fn is_before_reset(&self, motion: &JointMotion<N>) -> bool {
-        motion.resets != self.resets
+    fn is_before_reset(&self, pose: &Pose<N>) -> bool {
+        pose.resets != self.resets
     }
 
     fn end(&self, status: GoalStatus, code: ResultCode, why: &str) {
@@ -182,16 +163,16 @@ impl<const N: usize> PathFollower<N> {
     fn begin(
         &mut self,
         forwarded: ForwardGoal<FollowPath<N>>,
-        motion: &JointMotion<N>,
+        pose: &Pose<N>,
         ctx: &mut Context<Self>,
     ) {
         let ForwardGoal { goal, client, done } = forwarded;
         let start = Waypoint {
             time: 0.0,
-            position: motion.state.position,
-            velocity: Some(motion.state.velocity),
+            position: pose.state.position,
+            velocity: Some(pose.state.velocity),
         };
-        if let Some(obstacle) = motion.obstacle {
+        if let Some(obstacle) = pose.obstacle {
             return client.refuse(&obstacle.to_string());
         }
         let path = match JointPath::new(start, goal.points) {
@@ -211,12 +192,12 @@ impl<const N: usize> PathFollower<N> {
                 dwell: Dwell::default(),
             },
             client,
-            began: motion.time,
-            resets: motion.resets,
-            setpoint: motion.setpoint,
+            began: pose.time,
+            resets: pose.resets,
+            setpoint: pose.setpoint,
             feedback: Cadence::default(),
         });
-        self.lead(motion, Some(done), ctx);
+        self.lead(pose, Some(done), ctx);
     }
 
     /// Checks the arm, and moves its setpoint.
@@ -227,40 +208,40 @@ impl<const N: usize> PathFollower<N> {
 
     /// The same for a caller that waits for it.
     fn go_on(&self) -> impl ActorFuture<Self, Output = ()> + use<N> {
-        let motion = self.arm.motion.send(ArmMotion).into_actor(self);
-        motion.map(|motion, node, ctx| match motion {
-            Ok(motion) => node.lead(&motion, None, ctx),
+        let pose = self.arm.send(ArmPose).into_actor(self);
+        pose.map(|pose, node, ctx| match pose {
+            Ok(pose) => node.lead(&pose, None, ctx),
             Err(_) => node.abort("the arm does not answer"),
         })
     }
 
-    fn lead(&mut self, motion: &JointMotion<N>, done: Option<Done>, ctx: &mut Context<Self>) {
+    fn lead(&mut self, pose: &Pose<N>, done: Option<Done>, ctx: &mut Context<Self>) {
         let Some(goal) = &mut self.active else {
             return;
         };
-        if goal.is_before_reset(motion) {
+        if goal.is_before_reset(pose) {
             return self.abort(RESET);
         }
-        if let Some(obstacle) = motion.obstacle {
+        if let Some(obstacle) = pose.obstacle {
             return self.abort(&obstacle.to_string());
         }
-        let time = motion.time - goal.began;
+        let time = pose.time - goal.began;
         let desired = goal.course.path.at(time);
-        let standing = goal.course.judge(time, &motion.state);
-        let may_be_due = goal.client.wants_feedback && !motion.stands_still;
-        if may_be_due && goal.feedback.due(motion.time) {
-            let values = feedback(motion.time, time, &desired, &motion.state);
+        let standing = goal.course.judge(time, &pose.state);
+        let may_be_due = goal.client.wants_feedback && !pose.stands_still;
+        if may_be_due && goal.feedback.due(pose.time) {
+            let values = feedback(pose.time, time, &desired, &pose.state);
             goal.client.feed_back(values);
         }
         let next = match standing {
             Standing::Moving | Standing::Arrived => desired,
-            Standing::OffPath(_) | Standing::Late(_) => at_rest(&motion.state),
+            Standing::OffPath(_) | Standing::Late(_) => at_rest(&pose.state),
         };
         let moved = MoveSetpoint {
             from: std::mem::replace(&mut goal.setpoint, next),
             to: next,
         };
-        let moved = self.arm.setpoint.send(moved).into_actor(self);
+        let moved = self.setpoint.send(moved).into_actor(self);
         ctx.wait(moved.map(move |moved, node, ctx| {
             node.moved(moved.unwrap_or(false), standing, ctx);
             drop(done);
@@ -297,12 +278,12 @@ impl<const N: usize> PathFollower<N> {
 
     /// Ends the goal: another setpoint or a reset has replaced its own since the last check.
     fn tell_why(&self, ctx: &mut Context<Self>) {
-        let motion = self.arm.motion.send(ArmMotion).into_actor(self);
-        ctx.wait(motion.map(|motion, node, _| {
+        let pose = self.arm.send(ArmPose).into_actor(self);
+        ctx.wait(pose.map(|pose, node, _| {
             let goal = node.active.as_ref();
             let reset = goal
-                .zip(motion.ok())
-                .is_some_and(|(goal, motion)| goal.is_before_reset(&motion));
+                .zip(pose.ok())
+                .is_some_and(|(goal, pose)| goal.is_before_reset(&pose));
             node.abort(if reset {
                 RESET
             } else {
@@ -320,11 +301,11 @@ impl<const N: usize> PathFollower<N> {
 
     /// Holds the arm at its present pose, unless another setpoint is active.
     fn halt(&self, from: Setpoint<N>) -> impl Future<Output = ()> + use<N> {
-        let arm = self.arm.clone();
+        let (arm, setpoint) = (self.arm.clone(), self.setpoint.clone());
         async move {
-            if let Ok(motion) = arm.motion.send(ArmMotion).await {
-                let to = at_rest(&motion.state);
-                let _ = arm.setpoint.send(MoveSetpoint { from, to }).await;
+            if let Ok(pose) = arm.send(ArmPose).await {
+                let to = at_rest(&pose.state);
+                let _ = setpoint.send(MoveSetpoint { from, to }).await;
             }
         }
     }

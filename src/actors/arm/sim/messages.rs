@@ -6,8 +6,8 @@ use actix::prelude::*;
 
 use crate::actors::node::{Barrier, Done};
 use crate::actors::wire::TopicMessage;
-use crate::live::{ArmListener, GoalOrder, GoalProgress, Obstacle, Pose, Tracking};
-use crate::math::arm::State;
+use crate::live::{ArmListener, GoalOrder, GoalProgress, Pose, Tracking};
+use crate::math::kinematics::Unreachable;
 use crate::math::pid::Setpoint;
 use crate::math::simulation::Simulation;
 use crate::services::study::Present;
@@ -16,7 +16,7 @@ use crate::study::control_loop::ControlLoop;
 
 // ---- time and settings ----------------------------------------------------------------------------------------------
 
-/// Requests simulation time \[s\]. From `rosapi` and `rosout`.
+/// Requests simulation time \[s\]. From `rosout`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "f64")]
 pub struct SimulationTime;
@@ -52,25 +52,25 @@ pub struct SetListener<const N: usize>(pub Option<ArmListener<N>>);
 
 // ---- goals ----------------------------------------------------------------------------------------------------------
 
-/// Requests the arm's present pose. From `ik` and `ik_trial` at every request that depends on it, and from the
-/// republisher of frames when frames are due.
+/// Requests the arm's present pose. From `ik_trial` at every request that depends on it, from
+/// `joint_trajectory_controller` while a goal is active, and from the republisher of frames when frames are due.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Pose<N>")]
 pub struct ArmPose<const N: usize>;
 
-/// Begins a goal and ends the previous one, at the same time. From `ik_action`, which then publishes the
+/// Solves a goal, begins it and ends the previous one, at the same time. From `ik_action`, which then publishes the
 /// trajectory and sends the [`CommandGoal`].
 #[derive(Message)]
-#[rtype(result = "Tracking<N>")]
+#[rtype(result = "Result<Tracking<N>, Unreachable>")]
 pub struct TrackGoal<const N: usize> {
     /// The goal.
-    pub goal: GoalOrder<N>,
+    pub goal: GoalOrder,
     /// The receiver of feedback and of the end, unless the end is the answer to its own message.
     pub owner: Recipient<GoalProgress<N>>,
 }
 
-/// The sender informs clients of goals, so the arm sends it a [`Barrier`] before it reports that it is at rest, and
-/// between steps on request. From `ik_action` and `joint_trajectory_controller`, when they start, and for the registry.
+/// This actor informs clients of goals, so the arm sends it a [`Barrier`] before it reports that it is at rest, and
+/// between steps on request. From the runtime, for the registry, `ik_action` and `joint_trajectory_controller`.
 #[derive(Message, Debug, Clone)]
 #[rtype(result = "()")]
 pub struct AddBarrier(pub Recipient<Barrier>);
@@ -108,28 +108,6 @@ pub struct SetSetpoint<const N: usize> {
     pub setpoint: Setpoint<N>,
     /// Dropped when it has taken effect.
     pub done: Option<Done>,
-}
-
-/// Requests the arm's present motion. From `joint_trajectory_controller`, while a goal is active.
-#[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "JointMotion<N>")]
-pub struct ArmMotion<const N: usize>;
-
-/// The motion of the arm at one time.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct JointMotion<const N: usize> {
-    /// Positions and velocities.
-    pub state: State<N>,
-    /// The held joint state.
-    pub setpoint: Setpoint<N>,
-    /// Simulation time since the last reset \[s\].
-    pub time: f64,
-    /// The number of resets.
-    pub resets: u64,
-    /// Whether it is paused and no step has been taken since.
-    pub stands_still: bool,
-    /// Why it does not follow its setpoint; `None` if it does.
-    pub obstacle: Option<Obstacle>,
 }
 
 /// Moves the setpoint, if it is still the sender's last one. The answer is whether it was. From

@@ -13,9 +13,8 @@ mod turn;
 mod world;
 
 pub use self::messages::{
-    AddBarrier, ArmMotion, ArmPose, ArmSettings, CommandEffort, CommandGoal, EndGoal, HeldLimit,
-    JointMotion, MoveSetpoint, SetLimitPredictor, SetListener, SetSetpoint, SimulationTime,
-    Snapshot, TakeSnapshot, TrackGoal,
+    AddBarrier, ArmPose, ArmSettings, CommandEffort, CommandGoal, EndGoal, HeldLimit, MoveSetpoint,
+    SetLimitPredictor, SetListener, SetSetpoint, SimulationTime, Snapshot, TakeSnapshot, TrackGoal,
 };
 pub use self::node::ArmSim;
 pub use self::orders::ArmOrder;

@@ -7,15 +7,17 @@
 use actix::prelude::*;
 
 use super::messages::{
-    ArmMotion, ArmPose, CommandEffort, CommandGoal, EndGoal, JointMotion, MoveSetpoint,
-    SetListener, SetSetpoint, SimulationTime, Snapshot, TakeSnapshot, TrackGoal,
+    ArmPose, CommandEffort, CommandGoal, EndGoal, MoveSetpoint, SetListener, SetSetpoint,
+    SimulationTime, Snapshot, TakeSnapshot, TrackGoal,
 };
 use super::node::ArmSim;
 use crate::actors::wire::{Nodes, TopicMessage};
-use crate::live::{GoalProgress, Journal, Obstacle, Pose, Tracking};
+use crate::live::{GoalProgress, Journal, Pose, Tracking};
+use crate::math::kinematics::Unreachable;
 use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Topic;
-use crate::services::arm::{read_effort, read_setpoint};
+use crate::services::arm::read_effort;
+use crate::services::trajectory::read_setpoint;
 
 /// A message that needs the arm's present state, or changes it.
 pub trait ArmOrder<const N: usize>: Message {
@@ -64,7 +66,7 @@ impl<const N: usize> ArmOrder<N> for ArmPose<N> {
 }
 
 impl<const N: usize> ArmOrder<N> for TrackGoal<N> {
-    fn perform(self, node: &mut ArmSim<N>) -> Tracking<N> {
+    fn perform(self, node: &mut ArmSim<N>) -> Result<Tracking<N>, Unreachable> {
         node.arm.world.owner = Some(self.owner);
         node.arm.track_goal(&self.goal)
     }
@@ -85,20 +87,6 @@ impl<const N: usize> ArmOrder<N> for EndGoal<N> {
 impl<const N: usize> ArmOrder<N> for SetSetpoint<N> {
     fn perform(self, node: &mut ArmSim<N>) {
         node.arm.hold(self.setpoint);
-    }
-}
-
-impl<const N: usize> ArmOrder<N> for ArmMotion<N> {
-    fn perform(self, node: &mut ArmSim<N>) -> JointMotion<N> {
-        let (arm, simulation) = (&node.arm, &node.arm.simulation);
-        JointMotion {
-            state: *simulation.state(),
-            setpoint: *simulation.pid().setpoint(),
-            time: simulation.time(),
-            resets: arm.goals.past.resets,
-            stands_still: arm.paused && simulation.time() <= arm.paused_at,
-            obstacle: Obstacle::of(simulation),
-        }
     }
 }
 

@@ -13,11 +13,12 @@ use super::orders;
 use crate::actors::node::{Call, ShutDown, Unserved};
 use crate::actors::wire::Nodes;
 use crate::live::ArmRequest;
-use crate::protocol::catalog::{Direction, Node, Service, Topic};
+use crate::protocol::catalog::{Direction, Node, Rosapi, Service, Topic};
 use crate::services::arm::{
-    AskParameters, Disturb, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetPeriod,
-    SetState, Step, parameter_services,
+    AskParameters, Disturb, Enable, GetTime, Pause, Reset, SetGains, SetIntegrator, SetParams,
+    SetPeriod, SetState, Step, parameter_services,
 };
+use crate::services::goals::Solve;
 
 impl<const N: usize> ArmSim<N> {
     /// Adds this node's services and topics to the registry's table.
@@ -33,6 +34,8 @@ impl<const N: usize> ArmSim<N> {
         nodes.serve::<Step<N>>(Service::Step, address.clone());
         nodes.serve::<Pause>(Service::Pause, address.clone());
         nodes.serve::<Enable>(Service::Enable, address.clone());
+        nodes.serve::<Solve<N>>(Service::Solve, address.clone());
+        nodes.serve::<GetTime>(Service::Rosapi(Rosapi::GetTime), address.clone());
         for service in parameter_services() {
             nodes.serve::<AskParameters<N>>(service, address.clone());
         }

@@ -287,7 +287,7 @@ impl<const N: usize> TfRepublisher<N> {
         let (now, stamp) = (Instant::now(), Stamp::from_seconds(pose.time));
         let seen = |target: &str, sources: &[String]| {
             let sources = sources.iter().map(String::as_str);
-            seen_from(stamp, target, sources, &pose.lengths, &pose.positions)
+            seen_from(stamp, target, sources, &pose.lengths, &pose.state.position)
         };
         // A message is sent at the nearest tick: the next tick would be later than this one is early.
         let soon = now + PERIOD / 2;

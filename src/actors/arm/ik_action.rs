@@ -1,51 +1,40 @@
 //! Goals: `/ik_action/send_goal` and `/ik_action/cancel_goal`, feedback on `/ik_action/feedback`, the end on
 //! `/ik_action/result`.
 //!
-//! `ik` solves a goal. The arm is informed of it, and checks it at every step once it has the setpoint. Subscribers
-//! get that setpoint on `/joint_trajectory`. While a goal starts, the node handles no other message, so goals do not
-//! interleave.
+//! The arm solves a goal, and checks it at every step once it has the setpoint. Subscribers get that setpoint on
+//! `/joint_trajectory`. While a goal starts, the node handles no other message, so goals do not interleave.
 //!
 //! **Invariant:** at most one goal is active, and each has exactly one result. A preempting goal comes in this order:
 //! the old goal's result, the response, the trajectory, feedback, result.
-
-mod messages;
-mod services;
 
 use std::sync::Arc;
 
 use actix::prelude::*;
 use serde::Serialize;
 
-pub use self::messages::{
-    CancelGoal, CancelRejected, GoalOwner, GoalRejected, GoalReport, GoalSelector, SendGoal,
-};
-use self::services::GoalSender;
-use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{
-    AddBarrier, ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal, Tracking,
-    joint_names,
+    ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, Pose, TrackGoal, Tracking, joint_names,
 };
-use crate::actors::node::{Barrier, Call, Interest, Publish, Reply, ShutDown, ask};
-use crate::actors::wire::Nodes;
-use crate::actors::wire::action_client::{CancelSent, ForwardGoal};
+use crate::actors::node::{Ask, Asker, Barrier, Call, Done, Publish, Reply, ShutDown, Unserved};
+use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal, Goal, SentGoal};
+use crate::actors::wire::{Callable, Nodes};
 use crate::math::goal::Outcome;
-use crate::protocol::catalog::{Node, Service, Topic};
-use crate::protocol::messages::goal::{IkFeedback, IkResult, setpoint_trajectory};
-use crate::protocol::op::GoalStatus;
+use crate::protocol::catalog::{Action, Service, Topic};
+use crate::protocol::messages::goal::setpoint_trajectory;
+use crate::protocol::op::fields::Rejections;
+use crate::protocol::op::{Arguments, GoalStatus};
 use crate::services::goals::AcceptedGoal;
+pub use crate::services::goals::{CancelRejected, CancelRequest, GoalRejected, GoalRequest};
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
 /// The node `ik_action` for an arm of `N` links.
 pub struct IkAction<const N: usize> {
-    ik: Recipient<Call<Solve<N>>>,
     arm: GoalTracker<N>,
     publish: Recipient<Publish>,
     active: Option<ActiveGoal<N>>,
     /// Goals accepted so far: their numbers make the ids.
     accepted: u64,
-    feedback_wanted: bool,
-    result_wanted: bool,
 }
 
 /// The active goal.
@@ -57,6 +46,24 @@ struct ActiveGoal<const N: usize> {
     if_preempted: GoalStatus,
 }
 
+/// The receiver of a goal's news besides the subscribers.
+enum GoalOwner<const N: usize> {
+    /// The trial.
+    Node(Recipient<GoalReport<N>>),
+    /// A client that sent it by the action.
+    Client(Arc<ActionClient>),
+}
+
+/// The identification of a goal to be ended.
+enum GoalSelector {
+    /// The active goal.
+    Active,
+    /// The goal with this id, from the answer to its sender.
+    ById(String),
+    /// The goal of this client, sent by the action.
+    Sent(SentGoal),
+}
+
 /// The messages to the arm for goals.
 #[derive(Clone)]
 pub struct GoalTracker<const N: usize> {
@@ -66,8 +73,6 @@ pub struct GoalTracker<const N: usize> {
     pub command: Recipient<CommandGoal<N>>,
     /// Ends it.
     pub end: Recipient<EndGoal<N>>,
-    /// Registers a receiver of [`Barrier`]s before the arm reports that it is at rest.
-    pub add_barrier: Recipient<AddBarrier>,
 }
 
 impl<const N: usize> GoalTracker<N> {
@@ -78,7 +83,6 @@ impl<const N: usize> GoalTracker<N> {
             track: arm.clone().recipient(),
             command: arm.clone().recipient(),
             end: arm.clone().recipient(),
-            add_barrier: arm.clone().recipient(),
         }
     }
 }
@@ -86,30 +90,79 @@ impl<const N: usize> GoalTracker<N> {
 impl<const N: usize> IkAction<N> {
     /// A node without a goal.
     #[must_use]
-    pub fn new(
-        ik: Recipient<Call<Solve<N>>>,
-        arm: GoalTracker<N>,
-        publish: Recipient<Publish>,
-    ) -> Self {
+    pub fn new(arm: GoalTracker<N>, publish: Recipient<Publish>) -> Self {
         Self {
-            ik,
             arm,
             publish,
             active: None,
             accepted: 0,
-            feedback_wanted: false,
-            result_wanted: false,
         }
     }
 
-    /// Adds this node's services and topics to the registry's table.
+    /// Adds this node's services and its action to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        nodes.serve::<SendGoal<N>>(Service::SendGoal, address.clone());
-        nodes.serve::<CancelGoal>(Service::CancelGoal, address.clone());
-        nodes.carry_out::<SendGoal<N>, _>(address.clone());
-        for topic in [Topic::IkFeedback, Topic::IkResult] {
-            nodes.publishers.insert(topic, address.clone().recipient());
+        nodes.serve::<GoalRequest<N>>(Service::SendGoal, address.clone());
+        nodes.serve::<CancelRequest>(Service::CancelGoal, address.clone());
+        nodes.carry_out::<GoalRequest<N>, _>(address.clone());
+    }
+}
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// A goal of the trial. The answer is its id, sent before its trajectory is published.
+pub struct SendGoal<const N: usize> {
+    /// The goal.
+    pub goal: GoalRequest<N>,
+    /// The receiver of feedback besides the subscribers. It may end at any time.
+    pub owner: Recipient<GoalReport<N>>,
+}
+
+impl<const N: usize> Ask for SendGoal<N> {
+    type Answer = Result<String, GoalRejected>;
+}
+
+/// The progress of a goal, for the owner in its [`SendGoal`].
+#[derive(Message, Debug, Clone, PartialEq)]
+#[rtype(result = "()")]
+pub struct GoalReport<const N: usize> {
+    /// The goal.
+    pub goal_id: String,
+    /// Distance between end effector and target \[m\].
+    pub distance: f64,
+    /// The setpoint that the goal commanded \[rad\].
+    pub positions: [f64; N],
+    /// The state of the arm at that time.
+    pub pose: Pose<N>,
+    /// How it ended; `None` while it is active.
+    pub outcome: Option<Outcome>,
+}
+
+impl<const N: usize> Goal for GoalRequest<N> {
+    const ACTION: Action = Action::MoveTo;
+
+    fn read(arguments: &Arguments) -> Result<Self, Rejections> {
+        <Self as Callable>::read(Service::SendGoal, arguments)
+    }
+}
+
+/// A client that has sent a goal by the action. Feedback shows that it was accepted.
+struct GoalSender(Arc<ActionClient>);
+
+impl Asker<Result<String, GoalRejected>> for GoalSender {
+    fn answer(
+        self: Box<Self>,
+        answer: Result<Result<String, GoalRejected>, Unserved>,
+        _: Option<Done>,
+    ) {
+        match answer {
+            Ok(Ok(_)) => {}
+            Ok(Err(why)) => self.0.refuse(&why.to_string()),
+            Err(why) => self.0.refuse(&why.to_string()),
         }
+    }
+
+    fn warn(&self, why: &str) {
+        self.0.warn(why);
     }
 }
 
@@ -117,34 +170,34 @@ impl<const N: usize> IkAction<N> {
 
 impl<const N: usize> Actor for IkAction<N> {
     type Context = Context<Self>;
-
-    fn started(&mut self, ctx: &mut Context<Self>) {
-        let own = ctx.address().recipient();
-        self.arm.add_barrier.do_send(AddBarrier(own));
-    }
 }
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Handler<Call<SendGoal<N>>> for IkAction<N> {
+impl<const N: usize> Handler<Call<GoalRequest<N>>> for IkAction<N> {
     type Result = ();
 
-    fn handle(&mut self, call: Call<SendGoal<N>>, ctx: &mut Context<Self>) {
-        let pursuit = self.start_goal(call.ask, call.reply, ctx.address());
-        ctx.wait(pursuit);
+    fn handle(&mut self, Call { ask, reply }: Call<GoalRequest<N>>, ctx: &mut Context<Self>) {
+        self.start_goal(ask, None, reply, ctx);
     }
 }
 
-impl<const N: usize> Handler<ForwardGoal<SendGoal<N>>> for IkAction<N> {
+impl<const N: usize> Handler<Call<SendGoal<N>>> for IkAction<N> {
     type Result = ();
 
-    fn handle(&mut self, forwarded: ForwardGoal<SendGoal<N>>, ctx: &mut Context<Self>) {
+    fn handle(&mut self, Call { ask, reply }: Call<SendGoal<N>>, ctx: &mut Context<Self>) {
+        self.start_goal(ask.goal, Some(GoalOwner::Node(ask.owner)), reply, ctx);
+    }
+}
+
+impl<const N: usize> Handler<ForwardGoal<GoalRequest<N>>> for IkAction<N> {
+    type Result = ();
+
+    fn handle(&mut self, forwarded: ForwardGoal<GoalRequest<N>>, ctx: &mut Context<Self>) {
         let ForwardGoal { goal, client, done } = forwarded;
         let client = Arc::new(client);
         let reply = Reply::new(GoalSender(Arc::clone(&client)), Some(done));
-        let owner = Some(GoalOwner::Client(client));
-        let pursuit = self.start_goal(SendGoal { owner, ..goal }, reply, ctx.address());
-        ctx.wait(pursuit);
+        self.start_goal(goal, Some(GoalOwner::Client(client)), reply, ctx);
     }
 }
 
@@ -166,12 +219,16 @@ impl<const N: usize> Handler<CancelSent> for IkAction<N> {
     }
 }
 
-impl<const N: usize> Handler<Call<CancelGoal>> for IkAction<N> {
+impl<const N: usize> Handler<Call<CancelRequest>> for IkAction<N> {
     type Result = ();
 
-    fn handle(&mut self, call: Call<CancelGoal>, ctx: &mut Context<Self>) {
+    fn handle(&mut self, call: Call<CancelRequest>, ctx: &mut Context<Self>) {
         let mut reply = call.reply;
-        let cancellation = self.end(&call.ask.goal, GoalStatus::Canceled);
+        let goal = call
+            .ask
+            .goal_id
+            .map_or(GoalSelector::Active, GoalSelector::ById);
+        let cancellation = self.end(&goal, GoalStatus::Canceled);
         ctx.wait(cancellation.map(move |outcome, _, _| reply.answer(outcome)));
     }
 }
@@ -193,9 +250,15 @@ impl<const N: usize> Handler<GoalProgress<N>> for IkAction<N> {
         if progress.outcome.is_some() {
             self.conclude(&progress);
         } else if let Some(goal) = self.active.as_ref().filter(|goal| goal.is(&progress)) {
-            if self.feedback_wanted {
-                self.publish(Topic::IkFeedback, goal.feedback(&progress));
-            }
+            let (
+                accepted,
+                GoalProgress {
+                    distance, elapsed, ..
+                },
+            ) = (goal.goal.clone(), progress);
+            self.publish(Topic::IkFeedback, move || {
+                accepted.feedback(distance, elapsed)
+            });
             goal.inform_owner(&progress);
         }
     }
@@ -207,38 +270,11 @@ impl<const N: usize> Handler<Barrier> for IkAction<N> {
     fn handle(&mut self, _: Barrier, _: &mut Context<Self>) {}
 }
 
-impl<const N: usize> Handler<Interest> for IkAction<N> {
-    type Result = ();
-
-    fn handle(&mut self, Interest { topic, wanted }: Interest, _: &mut Context<Self>) {
-        match topic {
-            Topic::IkFeedback => self.feedback_wanted = wanted,
-            Topic::IkResult => self.result_wanted = wanted,
-            other => debug_assert!(false, "{} is not this node's", other.name()),
-        }
-    }
-}
-
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ActiveGoal<N> {
     fn is(&self, progress: &GoalProgress<N>) -> bool {
         self.goal.number == progress.number
-    }
-
-    fn feedback(&self, progress: &GoalProgress<N>) -> IkFeedback {
-        self.goal.feedback(progress.distance, progress.elapsed)
-    }
-
-    fn result(&self, progress: &GoalProgress<N>) -> IkResult {
-        self.goal.result(progress.distance, progress.outcome)
-    }
-
-    fn status(&self, progress: &GoalProgress<N>) -> GoalStatus {
-        match progress.outcome {
-            Some(Outcome::Reached) => GoalStatus::Succeeded,
-            _ => self.if_preempted,
-        }
     }
 
     /// Whether this goal has the given id.
@@ -260,10 +296,20 @@ impl<const N: usize> ActiveGoal<N> {
     fn inform_owner(&self, progress: &GoalProgress<N>) {
         match &self.owner {
             None => {}
-            Some(GoalOwner::Client(client)) => match progress.outcome {
-                None => client.feed_back(self.feedback(progress)),
-                Some(_) => client.conclude(self.result(progress), self.status(progress)),
-            },
+            Some(GoalOwner::Client(client)) => {
+                let GoalProgress {
+                    distance,
+                    elapsed,
+                    outcome,
+                    ..
+                } = *progress;
+                let status = match outcome {
+                    None => return client.feed_back(self.goal.feedback(distance, elapsed)),
+                    Some(Outcome::Reached) => GoalStatus::Succeeded,
+                    Some(Outcome::Preempted) => self.if_preempted,
+                };
+                client.conclude(self.goal.result(distance, outcome), status);
+            }
             Some(GoalOwner::Node(owner)) => owner.do_send(GoalReport {
                 goal_id: self.goal.id.clone(),
                 distance: progress.distance,
@@ -276,53 +322,57 @@ impl<const N: usize> ActiveGoal<N> {
 }
 
 impl<const N: usize> IkAction<N> {
-    /// Solves a goal and starts it. Its sender is answered in between.
+    /// Starts a goal. Its sender is answered before it is set in motion.
     fn start_goal(
-        &self,
-        goal: SendGoal<N>,
+        &mut self,
+        goal: GoalRequest<N>,
+        owner: Option<GoalOwner<N>>,
         mut reply: Reply<Result<String, GoalRejected>>,
-        own: Addr<Self>,
-    ) -> ResponseActFuture<Self, ()> {
-        let (ik, arm) = (self.ik.clone(), self.arm.track.clone());
-        let number = self.accepted + 1;
-        let (target, criteria) = (goal.target, goal.criteria);
-        let begun = async move {
-            let solution = ask(&ik, Solve(target)).await;
-            let solution = solution.map_err(|_| GoalRejected::NoAnswer(Node::Ik.name()))??;
-            let goal = GoalOrder {
-                number,
-                target: target.position,
-                criteria,
-                solution,
-            };
-            let owner = own.recipient();
-            let tracking = arm.send(TrackGoal { goal, owner }).await;
-            tracking.map_err(|_| GoalRejected::NoAnswer(Node::ArmSim.name()))
+        ctx: &mut Context<Self>,
+    ) {
+        let GoalRequest { target, criteria } = goal;
+        let order = GoalOrder {
+            number: self.accepted + 1,
+            target,
+            criteria,
         };
-        Box::pin(begun.into_actor(self).map(move |tracking, node, _| {
+        let begun = self.arm.track.send(TrackGoal {
+            goal: order,
+            owner: ctx.address().recipient(),
+        });
+        ctx.wait(begun.into_actor(self).map(move |tracking, node, _| {
+            let tracking = match tracking {
+                Ok(tracking) => tracking.map_err(GoalRejected::from),
+                Err(_) => Err(GoalRejected::NoAnswer),
+            };
             let is_accepted = tracking.is_ok();
             if let Ok(Some(obstacle)) = tracking.as_ref().map(|tracking| tracking.obstacle) {
                 reply.warn(&obstacle.to_string());
             }
-            reply.answer(tracking.map(|tracking| node.accept(number, goal, tracking)));
+            reply.answer(tracking.map(|tracking| node.accept(&order, owner, tracking)));
             if is_accepted {
                 node.set_in_motion();
             }
             drop(reply);
-        }))
+        }));
     }
 
     /// Publishes the old goal's result and replaces it by the new goal.
-    fn accept(&mut self, number: u64, goal: SendGoal<N>, tracking: Tracking<N>) -> String {
+    fn accept(
+        &mut self,
+        order: &GoalOrder,
+        owner: Option<GoalOwner<N>>,
+        tracking: Tracking<N>,
+    ) -> String {
         if let Some(before) = tracking.before {
             self.conclude(&before);
         }
-        let accepted = AcceptedGoal::new(number, goal.target, tracking.positions);
-        let id = accepted.id.clone();
-        self.accepted = number;
+        let goal = AcceptedGoal::new(order.number, order.target, tracking.positions);
+        let id = goal.id.clone();
+        self.accepted = order.number;
         self.active = Some(ActiveGoal {
-            goal: accepted,
-            owner: goal.owner,
+            goal,
+            owner,
             if_preempted: GoalStatus::Aborted,
         });
         id
@@ -335,8 +385,7 @@ impl<const N: usize> IkAction<N> {
         };
         let (number, positions) = (goal.goal.number, goal.goal.positions);
         let trajectory = move || setpoint_trajectory(&joint_names::<N>(), &positions);
-        self.publish
-            .do_send(Publish::made(Topic::JointTrajectory, trajectory));
+        self.publish(Topic::JointTrajectory, trajectory);
         self.arm.command.do_send(CommandGoal { number, positions });
     }
 
@@ -376,13 +425,18 @@ impl<const N: usize> IkAction<N> {
         let Some(goal) = self.active.take_if(|goal| goal.is(progress)) else {
             return;
         };
-        if self.result_wanted {
-            self.publish(Topic::IkResult, goal.result(progress));
-        }
+        let (
+            accepted,
+            GoalProgress {
+                distance, outcome, ..
+            },
+        ) = (goal.goal.clone(), *progress);
+        self.publish(Topic::IkResult, move || accepted.result(distance, outcome));
         goal.inform_owner(progress);
     }
 
-    fn publish(&self, topic: Topic, message: impl Serialize + Send + 'static) {
-        self.publish.do_send(Publish::made(topic, move || message));
+    /// The registry makes the message, if the topic has subscribers.
+    fn publish<M: Serialize>(&self, topic: Topic, make: impl FnOnce() -> M + Send + 'static) {
+        self.publish.do_send(Publish::made(topic, make));
     }
 }

@@ -1,0 +1,288 @@
+//! Trajectories: the setpoint of a message on `/joint_trajectory`, and the goal of
+//! `control_msgs/action/FollowJointTrajectory` with its tolerances.
+//!
+//! **Invariant:** every setpoint and point has a finite position of each joint, in the arm's order. Every error names
+//! its field.
+
+use serde_json::value::RawValue;
+
+use super::arm::joint_names;
+use crate::math::pid::Setpoint;
+use crate::math::trajectory::{Tolerance, Waypoint};
+use crate::protocol::catalog::Action;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Reason, RejectedField, Rejections, finite};
+use crate::protocol::wire::json::{self, Entries, Payload};
+use crate::protocol::wire::text;
+
+/// Most points of a path: more than a planner needs for a few joints. Each takes a hundred bytes while the goal is
+/// active.
+pub const MAX_POINTS: usize = 4096;
+/// Most entries of a list of tolerances: enough for each joint several times over.
+const MAX_TOLERANCES: usize = 16;
+/// Default position tolerance of each joint at the end \[rad\].
+const GOAL_TOLERANCE: f64 = 0.05;
+/// Default velocity tolerance of each joint at the end \[rad/s\]: the default of `ros2_control`.
+const STOPPED_VELOCITY: f64 = 0.01;
+/// Default time after the end in which the joints must arrive \[s\].
+const GOAL_TIME: f64 = 5.0;
+
+/// Reads the setpoint of a message.
+///
+/// Only the last point counts. If `joint_names` is a permutation of the arm's, its values are matched by name, otherwise
+/// by position. Velocities that are missing, too few, too many or not finite count as zeros.
+///
+/// # Errors
+/// If there is no point, or the positions are not one finite number per joint.
+pub fn read_setpoint<const N: usize>(msg: &Payload) -> Result<Setpoint<N>, RejectedField> {
+    let [names, points] = members(msg.raw(), "msg", &["joint_names", "points"])?;
+    let points = required(points, "points")?;
+    let points = json::entries(points, 0).ok_or_else(|| mistyped("points", "an array", points))?;
+    let no_points = || RejectedField::refused("points", &"must have at least one entry");
+    let last = points.last.ok_or_else(no_points)?;
+    let field = format!("points[{}]", points.count - 1);
+    let [positions, velocities] = members(last, &field, &["positions", "velocities"])?;
+    let names = names.and_then(|names| json::entries(names, N));
+
+    let field = format!("{field}.positions");
+    let position = required(positions, &field)
+        .and_then(|raw| numbers(raw, &field))
+        .map_err(|rejection| with_missing_joints(rejection, names.as_ref(), &joint_names::<N>()))?;
+    let velocity = velocities.and_then(|raw| numbers(raw, "velocities").ok());
+    let order = names.and_then(|names| order(&names));
+    let order = order.unwrap_or_else(|| std::array::from_fn(|joint| joint));
+    Ok(Setpoint {
+        position: by_joint(order, &position),
+        velocity: by_joint(order, &velocity.unwrap_or([0.0; N])),
+    })
+}
+
+/// The rejection of too few or too many positions, with the joints that `names` lacks, if all names are joints.
+fn with_missing_joints(
+    mut rejection: RejectedField,
+    names: Option<&Entries<'_>>,
+    joints: &[&str],
+) -> RejectedField {
+    let are_few = |names: &&Entries<'_>| names.count > 0 && names.count == names.first.len();
+    let named = names.filter(are_few).and_then(|names| {
+        let named = names.first.iter().map(|name| json::text(name));
+        named.collect::<Option<Vec<_>>>()
+    });
+    if let (Reason::Length { .. }, Some(named)) = (&rejection.reason, named)
+        && named.iter().all(|name| joints.contains(&&**name))
+    {
+        let is_missing = |joint: &&&str| !named.iter().any(|name| name == **joint);
+        let missing: Vec<&str> = joints.iter().filter(is_missing).copied().collect();
+        if !missing.is_empty() {
+            let missing = missing.join(", ");
+            let reason = format!("{}: joint_names lacks {missing}", rejection.reason);
+            rejection.reason = Reason::Refused(reason);
+        }
+    }
+    rejection
+}
+
+/// A path to follow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FollowPath<const N: usize> {
+    /// The points after the present pose.
+    pub points: Vec<Waypoint<N>>,
+    /// Tolerance on the way.
+    pub on_the_way: Tolerance<N>,
+    /// Tolerance at the end.
+    pub at_the_end: Tolerance<N>,
+    /// Time after the end in which the joints must arrive \[s\]; infinite for no limit.
+    pub patience: f64,
+}
+
+impl<const N: usize> FollowPath<N> {
+    /// Reads a goal.
+    ///
+    /// # Errors
+    /// All errors of the goal, or of the first invalid point.
+    pub fn read(args: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::of_goal(args, Action::FollowJointTrajectory)?;
+        let trajectory = fields.raw("trajectory");
+        let mut entries = |name| fields.entries(name, MAX_TOLERANCES).unwrap_or_default();
+        let (on_the_way, at_the_end) = (entries("path_tolerance"), entries("goal_tolerance"));
+        let patience = fields.raw("goal_time_tolerance");
+        let Some(trajectory) = trajectory.filter(|_| fields.accepted()) else {
+            return Err(fields.finish());
+        };
+        let default = [Some(GOAL_TOLERANCE), Some(STOPPED_VELOCITY)];
+        Ok(Self {
+            points: points(trajectory)?,
+            on_the_way: tolerance(&on_the_way, "path_tolerance", [None; 2])?,
+            at_the_end: tolerance(&at_the_end, "goal_tolerance", default)?,
+            patience: match patience {
+                Some(raw) => match seconds(raw, "goal_time_tolerance", Bound::Finite)? {
+                    0.0 => GOAL_TIME,
+                    none if none < 0.0 => f64::INFINITY,
+                    patience => patience,
+                },
+                None => GOAL_TIME,
+            },
+        })
+    }
+}
+
+fn points<const N: usize>(trajectory: &RawValue) -> Result<Vec<Waypoint<N>>, RejectedField> {
+    let [names, points] = members(trajectory, "trajectory", &["joint_names", "points"])?;
+    let names = names.and_then(|names| json::entries(names, N));
+    let order = names.and_then(|names| order(&names)).ok_or_else(|| {
+        let expected = format!("must name {}, each once", joint_names::<N>().join(", "));
+        RejectedField::refused("trajectory.joint_names", &expected)
+    })?;
+    let field = "trajectory.points";
+    let points = required(points, field)?;
+    let entries =
+        json::entries(points, MAX_POINTS).ok_or_else(|| mistyped(field, "an array", points))?;
+    if entries.count > MAX_POINTS {
+        let (limit, got) = (MAX_POINTS, entries.count);
+        return Err(rejected(field, Reason::TooMany { limit, got }));
+    }
+    let indexed = entries.first.into_iter().enumerate();
+    indexed
+        .map(|(at, raw)| point(raw, &format!("{field}[{at}]"), order))
+        .collect()
+}
+
+fn point<const N: usize>(
+    raw: &RawValue,
+    field: &str,
+    order: [usize; N],
+) -> Result<Waypoint<N>, RejectedField> {
+    let names = ["positions", "velocities", "time_from_start"];
+    let [positions, velocities, time] = members(raw, field, &names)?;
+    let named = |name: &str| format!("{field}.{name}");
+    let positions = required(positions, &named("positions"))?;
+    let time = required(time, &named("time_from_start"))?;
+    let values = |raw: &RawValue, name: &str| {
+        let values = numbers(raw, &named(name))?;
+        Ok(by_joint(order, &values))
+    };
+    Ok(Waypoint {
+        time: seconds(time, &named("time_from_start"), Bound::NonNegative)?,
+        position: values(positions, "positions")?,
+        // An empty array counts as missing in a ROS message.
+        velocity: velocities
+            .filter(|raw| json::entries(raw, 0).is_none_or(|entries| entries.count > 0))
+            .map(|raw| values(raw, "velocities"))
+            .transpose()?,
+    })
+}
+
+/// A duration in seconds, under the names of ROS 2 or of ROS 1: the sum of its parts, each within `bound`.
+fn seconds(raw: &RawValue, field: &str, bound: Bound) -> Result<f64, RejectedField> {
+    let [sec, nanosec, secs, nsecs] =
+        json::members(raw.get(), &["sec", "nanosec", "secs", "nsecs"])
+            .map_err(|_| mistyped(field, "an object with sec and nanosec", raw))?;
+    let seconds = number_or_zero(sec.or(secs), &format!("{field}.sec"), bound)?;
+    let nanoseconds = number_or_zero(nanosec.or(nsecs), &format!("{field}.nanosec"), bound)?;
+    let sum = seconds + 1e-9 * nanoseconds;
+    if !sum.is_finite() {
+        let why = "must be a finite number of seconds";
+        return Err(RejectedField::refused(field, &why));
+    }
+    Ok(sum)
+}
+
+/// The tolerance of each joint, with the default ones of position and velocity for a missing value and for 0. A negative
+/// value means no limit.
+fn tolerance<const N: usize>(
+    entries: &[&RawValue],
+    name: &str,
+    [position, velocity]: [Option<f64>; 2],
+) -> Result<Tolerance<N>, RejectedField> {
+    let mut tolerance = Tolerance {
+        position: [position; N],
+        velocity: [velocity; N],
+    };
+    let limit = |value: f64, default: Option<f64>| match value {
+        0.0 => default,
+        value => Some(value).filter(|value| *value > 0.0),
+    };
+    for (at, raw) in entries.iter().enumerate() {
+        let field = format!("{name}[{at}]");
+        let names = ["name", "position", "velocity"];
+        let [joint, of_position, of_velocity] = members(raw, &field, &names)?;
+        let joint = joint.and_then(json::text).unwrap_or_default();
+        let joint = joint_names::<N>().iter().position(|one| *one == joint);
+        let unknown =
+            || RejectedField::refused(&format!("{field}.name"), &"must be that of a joint");
+        let joint = joint.ok_or_else(unknown)?;
+        for (raw, name, limits, default) in [
+            (of_position, "position", &mut tolerance.position, position),
+            (of_velocity, "velocity", &mut tolerance.velocity, velocity),
+        ] {
+            let value = number_or_zero(raw, &format!("{field}.{name}"), Bound::Finite)?;
+            if let Some(one) = limits.get_mut(joint) {
+                *one = limit(value, default);
+            }
+        }
+    }
+    Ok(tolerance)
+}
+
+// ---- parts ----------------------------------------------------------------------------------------------------------
+
+fn rejected(field: &str, reason: Reason) -> RejectedField {
+    let field = field.to_owned();
+    RejectedField { field, reason }
+}
+
+fn mistyped(field: &str, expected: &'static str, raw: &RawValue) -> RejectedField {
+    let (expected, found) = (expected.into(), text::found(raw));
+    rejected(field, Reason::Mistyped { expected, found })
+}
+
+fn required<'a>(raw: Option<&'a RawValue>, field: &str) -> Result<&'a RawValue, RejectedField> {
+    raw.ok_or_else(|| rejected(field, Reason::Missing))
+}
+
+/// The members of these names in an object.
+fn members<'a, const M: usize>(
+    raw: &'a RawValue,
+    field: &str,
+    names: &[&str; M],
+) -> Result<[Option<&'a RawValue>; M], RejectedField> {
+    json::members(raw.get(), names).map_err(|_| mistyped(field, "an object", raw))
+}
+
+fn number_or_zero(raw: Option<&RawValue>, field: &str, bound: Bound) -> Result<f64, RejectedField> {
+    raw.map_or(Ok(0.0), |raw| finite(raw, bound))
+        .map_err(|reason| rejected(field, reason))
+}
+
+/// An array of `N` finite numbers.
+fn numbers<const N: usize>(raw: &RawValue, field: &str) -> Result<[f64; N], RejectedField> {
+    let entries =
+        json::entries(raw, N).ok_or_else(|| mistyped(field, "an array of numbers", raw))?;
+    let length = Reason::Length {
+        expected: N,
+        got: entries.count,
+    };
+    let number = |(at, raw): (usize, &RawValue)| {
+        finite(raw, Bound::Finite).map_err(|reason| rejected(&format!("{field}[{at}]"), reason))
+    };
+    if entries.count != N {
+        return Err(rejected(field, length));
+    }
+    let numbers = entries.first.into_iter().enumerate().map(number);
+    let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
+    numbers.try_into().map_err(|_| rejected(field, length))
+}
+
+/// The index in the message of each joint of the arm; `None` unless `names` has each joint once.
+fn order<const N: usize>(names: &Entries<'_>) -> Option<[usize; N]> {
+    let spelled = names.first.iter().filter_map(|name| json::text(name));
+    let spelled: Vec<_> = spelled.collect();
+    let place = |joint: &str| spelled.iter().position(|name| name == joint);
+    let places: Option<Vec<usize>> = joint_names::<N>().into_iter().map(place).collect();
+    places?.try_into().ok().filter(|_| names.count == N)
+}
+
+/// The values in the arm's order.
+fn by_joint<const N: usize>(order: [usize; N], values: &[f64; N]) -> [f64; N] {
+    order.map(|place| values.get(place).copied().unwrap_or_default())
+}
