@@ -12,7 +12,6 @@ use bytes::Bytes;
 use tokio::sync::oneshot;
 
 use crate::actors::ConnectionId;
-use crate::actors::node::Done;
 pub use crate::actors::node::{FrameKind, Publish, Respond};
 use crate::actors::resources::memory::Permit;
 use crate::protocol::catalog::{Service, Topic};
@@ -219,8 +218,6 @@ pub enum ToClient {
         topic: Option<Arc<str>>,
         /// The message, shared by all subscribers of this form.
         frame: Bytes,
-        /// Dropped once the message has been offered to the client's socket, if its publisher waits for that.
-        done: Option<Done>,
     },
     /// A response, a status, or a call forwarded to this client as a provider. It is never dropped.
     Respond {

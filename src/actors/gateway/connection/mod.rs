@@ -180,9 +180,7 @@ impl<S> Connection<S> {
     fn take(&mut self, message: ToClient) {
         let outgoing = &mut self.outgoing;
         match message {
-            ToClient::Deliver { topic, frame, done } => {
-                outgoing.accept(topic.as_ref(), frame, done);
-            }
+            ToClient::Deliver { topic, frame } => outgoing.accept(topic.as_ref(), frame),
             ToClient::Respond { frame, service } => {
                 outgoing.push_response(frame, service.map_or(&[], Service::supersedes));
                 if service.is_some_and(Service::is_computation) {

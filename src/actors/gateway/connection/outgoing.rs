@@ -12,7 +12,6 @@ use tokio::time::Instant;
 
 use super::flow::{FRESH, FlowControl, UnreadSource};
 use crate::actors::gateway::limits::{LINGER, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES};
-use crate::actors::node::Done;
 use crate::actors::resources::gauges::Gauges;
 use crate::protocol::outbox::{MAX_AGE, Outbox, Throttle};
 
@@ -30,8 +29,6 @@ pub(super) struct Outgoing {
     progress: Instant,
     /// Start of the time in which responses have waited without a break.
     responses_since: Option<Instant>,
-    /// Guards of messages that were not offered to the socket yet. Their publishers wait.
-    being_written: Vec<Done>,
 }
 
 impl Outgoing {
@@ -46,7 +43,6 @@ impl Outgoing {
             backlog: Arc::default(),
             progress: now,
             responses_since: None,
-            being_written: Vec::new(),
         }
     }
 
@@ -58,8 +54,7 @@ impl Outgoing {
     // ---- putting in -------------------------------------------------------------------------------------------------
 
     /// Adds a topic message, or a series of messages.
-    pub(super) fn accept(&mut self, topic: Option<&Arc<str>>, frame: Bytes, done: Option<Done>) {
-        self.being_written.extend(done);
+    pub(super) fn accept(&mut self, topic: Option<&Arc<str>>, frame: Bytes) {
         let now = Instant::now().into_std();
         self.counting_dropped(|outbox| match topic {
             Some(topic) => outbox.push(topic, frame, now),
@@ -80,6 +75,7 @@ impl Outgoing {
     pub(super) fn push_response(&mut self, frame: Bytes, superseded: &[&'static str]) {
         self.responses_since.get_or_insert_with(Instant::now);
         self.outbox.push_response(frame, superseded);
+        self.note_backlog();
     }
 
     /// Sets the throttle of a topic, or removes the topic.
@@ -136,9 +132,17 @@ impl Outgoing {
         self.progress = Instant::now();
         self.flow.note_written(bytes, self.progress);
         self.outbox.written(bytes);
+        if self.responses_since.is_some() {
+            self.note_backlog();
+        }
         if self.outbox.response_bytes() == 0 {
             self.responses_since = None;
         }
+    }
+
+    fn note_backlog(&self) {
+        let waiting = self.outbox.short_bytes();
+        self.backlog.store(waiting, Ordering::Relaxed);
     }
 
     /// The earliest time of the next write, if nothing can be written now. Either a message is throttled, or the client
@@ -169,14 +173,5 @@ impl Outgoing {
             None if is_finishing => Some(last_byte + LINGER),
             None => self.outbox.has_long().then(|| last_byte + STALL_LIMIT),
         }
-    }
-
-    /// Notes that new messages were offered to the socket. Their publishers continue.
-    pub(super) fn end_turn(&mut self) {
-        let waiting = self.outbox.short_bytes();
-        if self.backlog.load(Ordering::Relaxed) != waiting {
-            self.backlog.store(waiting, Ordering::Relaxed);
-        }
-        self.being_written.clear();
     }
 }

@@ -44,9 +44,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> ActorFuture<Connection<S>> for
         cx: &mut task::Context<'_>,
     ) -> Poll<()> {
         let this = self.get_mut();
-        let polled = contain(|| this.poll_to_the_end(connection, cx));
-        connection.outgoing.end_turn();
-        match polled {
+        match contain(|| this.poll_to_the_end(connection, cx)) {
             Ok(Poll::Pending) => return Poll::Pending,
             Ok(Poll::Ready(())) => {}
             Err(panic) => tracing::error!(%panic, "a client's writer failed; its connection ends"),

@@ -168,11 +168,10 @@ impl Client {
 
     /// Sends feedback of a goal. It may be dropped.
     fn deliver_feedback(&self, frame: Bytes) {
-        self.outlets.mailbox.do_send(ToClient::Deliver {
-            topic: None,
-            frame,
-            done: None,
-        });
+        let topic = None;
+        self.outlets
+            .mailbox
+            .do_send(ToClient::Deliver { topic, frame });
     }
 
     /// Sets the form in which the client gets the reason of a failed call, if `form` is given.

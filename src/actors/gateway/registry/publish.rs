@@ -88,8 +88,8 @@ impl Registry {
     }
 
     /// Delivers a message, or a series of messages, to every subscriber of `topic`, an absolute name, in all spellings.
-    /// `encode` makes the JSON for a spelling. `done` belongs to a publisher that can wait. A node cannot wait. Returns
-    /// the number of subscribers.
+    /// `encode` makes the JSON for a spelling. `done` belongs to a publisher that can wait for a worker thread. A node
+    /// cannot wait. Returns the number of subscribers.
     fn fan_out(
         &self,
         topic: &str,
@@ -113,7 +113,7 @@ impl Registry {
             };
             let is_asked = |one: &(&str, Bytes, Encoding)| one.0 == spelling && one.2 == encoding;
             if is_sent_plain(encoding, frame.len()) {
-                deliver(subscriber, frame, done);
+                deliver(subscriber, frame);
             } else if !others.iter().any(is_asked) {
                 others.push((spelling, frame, encoding));
             }
@@ -128,24 +128,25 @@ impl Registry {
     fn deliver_encoded(&self, message: ToEncode, done: Option<&Done>, ctx: &mut Context<Self>) {
         // A node cannot wait, and its messages are short.
         if done.is_none() || !message.is_long() {
-            return self.deliver_made(&message, &message.make(), done);
+            return self.deliver_made(&message, &message.make());
         }
         let done = done.cloned();
         let kind = WorkKind::of(message.plain.len());
         let making = run_long_work(kind, move || (message.make(), message));
         ctx.spawn(making.into_actor(self).map(move |made, registry, _| {
             if let Some((made, message)) = made {
-                registry.deliver_made(&message, &made, done.as_ref());
+                registry.deliver_made(&message, &made);
             }
+            drop(done);
         }));
     }
 
     /// Delivers a message in one form to the subscribers that requested that form.
-    fn deliver_made(&self, message: &ToEncode, made: &Made, done: Option<&Done>) {
+    fn deliver_made(&self, message: &ToEncode, made: &Made) {
         let topic = names::absolute(&message.spelling);
         for subscriber in self.subscribers_as(&topic, &message.spelling) {
             if subscriber.encoding == message.encoding {
-                self.deliver_form(subscriber, made, done);
+                self.deliver_form(subscriber, made);
             }
         }
     }
@@ -157,10 +158,10 @@ impl Registry {
     }
 
     /// Delivers the messages of a form. Messages that could not be made count as dropped.
-    fn deliver_form(&self, subscriber: &Subscriber, made: &Made, done: Option<&Done>) {
+    fn deliver_form(&self, subscriber: &Subscriber, made: &Made) {
         self.gauges.add_dropped(made.lost);
         for frame in &made.messages {
-            deliver(subscriber, frame.clone(), done);
+            deliver(subscriber, frame.clone());
         }
     }
 
@@ -174,10 +175,10 @@ impl Registry {
         if let Some(subscriber) = subscribers.find(|one| one.connection == to) {
             let plain = messages::respelled(topic.name(), spelling, frame);
             if is_sent_plain(subscriber.encoding, plain.len()) {
-                return deliver(subscriber, plain, None);
+                return deliver(subscriber, plain);
             }
             let message = self.to_encode(spelling, plain, subscriber.encoding);
-            self.deliver_form(subscriber, &message.make(), None);
+            self.deliver_form(subscriber, &message.make());
         }
     }
 
@@ -229,10 +230,9 @@ fn is_sent_plain(encoding: Encoding, length: usize) -> bool {
     encoding.compression == Compression::None && is_short && !encoding.ros1_stamps
 }
 
-fn deliver(subscriber: &Subscriber, frame: Bytes, done: Option<&Done>) {
-    subscriber.mailbox.do_send(ToClient::Deliver {
-        topic: Some(Arc::clone(&subscriber.spelling)),
-        frame,
-        done: done.cloned(),
-    });
+fn deliver(subscriber: &Subscriber, frame: Bytes) {
+    let topic = Some(Arc::clone(&subscriber.spelling));
+    subscriber
+        .mailbox
+        .do_send(ToClient::Deliver { topic, frame });
 }
