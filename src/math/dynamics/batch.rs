@@ -117,7 +117,7 @@ fn together<S: Simd, const K: usize, const N: usize>(
     let lanes = Wide::<S, K>::LANES;
     // One length for all columns, so that it is compared once and not for every load.
     let [q, qd, tau] = [q, qd, tau].map(|columns| columns.map(|column| &column[..count]));
-    let mut qdd = qdd.each_mut().map(|column| &mut column[..count]);
+    let qdd = qdd.each_mut().map(|column| &mut column[..count]);
     let zero = Wide::<S, K>::splat(simd, 0.0);
     let gravity = zero.like(arm.gravity);
     let rods = entries!(in_lanes(&arm.rods[0], zero), i => in_lanes(&arm.rods[i], zero));
