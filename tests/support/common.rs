@@ -3,7 +3,7 @@
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::path::Path;
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
@@ -39,6 +39,25 @@ pub fn without_variables(mut command: Command) -> Command {
         command.env_remove(variable);
     }
     command
+}
+
+/// The program, started by a shell that first runs `prelude`, for example to set limits.
+pub fn shell(prelude: &str) -> Command {
+    let mut shell = Command::new("sh");
+    let script = format!("{prelude} && exec \"$0\" \"$@\"");
+    shell.args(["-c", &script, env!("CARGO_BIN_EXE_pendularm")]);
+    without_variables(shell)
+}
+
+/// The one error line of a command that failed with this exit status and printed nothing else.
+#[track_caller]
+pub fn complaint(output: &Output, status: i32) -> String {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(status), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(output.stdout.is_empty());
+    let complaint = said.trim_end().strip_prefix("pendularm: ");
+    complaint.expect(&said).to_owned()
 }
 
 /// Sends a signal, by its name.
@@ -129,17 +148,14 @@ impl Runtime {
         Self::spawn(program(), bind, arguments)
     }
 
-    /// The same, started by a shell that first runs `prelude`, for example to set limits.
+    /// The same, started by a [`shell`].
     pub fn under(prelude: &str) -> Self {
         Self::under_with(prelude, &[])
     }
 
     /// The same with more arguments.
     pub fn under_with(prelude: &str, arguments: &[&str]) -> Self {
-        let mut shell = Command::new("sh");
-        let script = format!("{prelude} && exec \"$0\" \"$@\"");
-        shell.args(["-c", &script, env!("CARGO_BIN_EXE_pendularm")]);
-        Self::spawn(without_variables(shell), "127.0.0.1:0", arguments)
+        Self::spawn(shell(prelude), "127.0.0.1:0", arguments)
     }
 
     /// The same without ignored signals, because a shell ignores some for its background jobs.

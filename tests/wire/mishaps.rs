@@ -4,28 +4,11 @@
 
 use std::fs::{self, File};
 use std::io::Write;
-use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
-use crate::common::{Client, Logged, Runtime, program, signal};
+use crate::common::{Client, Logged, Runtime, program, shell, signal};
 use crate::folder::Folder;
 use serde_json::{Value, json};
-
-fn shell(prelude: &str) -> Command {
-    let mut shell = Command::new("sh");
-    let script = format!("{prelude} && exec \"$0\" \"$@\"");
-    shell.args(["-c", &script, env!("CARGO_BIN_EXE_pendularm")]);
-    shell
-}
-
-/// Whether a record has its index: the last bytes of a whole file.
-#[cfg(feature = "record")]
-fn is_whole(path: &Path) -> bool {
-    use pendularm::record::{RecordEnding, Recording};
-    let mut recording = Recording::new(File::open(path).unwrap());
-    while recording.next_passage().unwrap().is_some() {}
-    recording.ending() == Some(RecordEnding::Whole)
-}
 
 #[cfg(all(feature = "record", target_os = "linux"))]
 #[test]
@@ -42,7 +25,8 @@ fn every_signal_that_ends_a_process_by_default_ends_the_program_in_order_and_its
         signal(runtime.pid(), name);
         assert!(runtime.end().0.success(), "{name}");
         assert!(client.is_closed());
-        assert!(is_whole(&path), "{name}");
+        let (_, ending) = crate::record::passages(&path);
+        assert_eq!(ending, pendularm::record::RecordEnding::Whole, "{name}");
     }
 }
 

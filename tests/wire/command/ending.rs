@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::thread;
 
-use crate::common::{self, Runtime};
+use crate::common::{self, Runtime, complaint};
 use crate::folder::Folder;
 
 /// Every command that needs a server, with its arguments.
@@ -44,17 +44,6 @@ fn program(line: &str) -> Command {
 
 fn output(line: &str) -> Output {
     program(line).output().unwrap()
-}
-
-/// The error line of a command that failed.
-#[track_caller]
-fn complaint(output: &Output, status: i32) -> String {
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(status), "{said}");
-    assert_eq!(said.lines().count(), 1, "{said}");
-    assert!(said.starts_with("pendularm: "), "{said}");
-    assert!(output.stdout.is_empty());
-    said
 }
 
 #[test]
@@ -138,10 +127,7 @@ fn a_token_is_shown_from_the_option_or_the_variable() {
     assert_eq!(command.output().unwrap().status.code(), Some(0));
     command.env("ARM_SIM_TOKEN", "short");
     let said = complaint(&command.output().unwrap(), 2);
-    assert!(
-        said.starts_with("pendularm: ARM_SIM_TOKEN must be at least"),
-        "{said}"
-    );
+    assert!(said.starts_with("ARM_SIM_TOKEN must be at least"), "{said}");
 }
 
 /// As in `pendularm topic echo /clock | head -n 1`.

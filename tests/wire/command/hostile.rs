@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
@@ -39,13 +39,17 @@ fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
 
 /// A command that contacts that server.
 fn start(arguments: &[&str], address: &str) -> Child {
-    let mut command = common::program();
-    command.args(arguments).args(["--connect", address]);
-    command
+    start_by(common::program(), arguments, address)
+}
+
+fn start_by(mut program: Command, arguments: &[&str], address: &str) -> Child {
+    program
+        .args(arguments)
+        .args(["--connect", address])
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
-    command.spawn().unwrap()
+    program.spawn().unwrap()
 }
 
 /// Exit status, standard output and standard error of a command that has to end by itself within `common::PATIENCE`.
@@ -163,16 +167,8 @@ fn a_long_key_of_diagnostics_pads_no_other_line() {
 /// A command that may use this many kilobytes of memory.
 #[cfg(target_os = "linux")]
 fn start_within(kilobytes: u32, arguments: &[&str], address: &str) -> Child {
-    let mut command = std::process::Command::new("bash");
-    command
-        .args(["-c", &format!("ulimit -v {kilobytes}; exec \"$@\""), "bash"])
-        .arg(common::program().get_program())
-        .args(arguments)
-        .args(["--connect", address])
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command.spawn().unwrap()
+    let limited = common::shell(&format!("ulimit -v {kilobytes}"));
+    start_by(limited, arguments, address)
 }
 
 /// As a tree the values of 4 MB would take 260 MB.

@@ -77,16 +77,7 @@ fn json_of(runtime: &Runtime, line: &str) -> Value {
 /// The error line of a command that must be refused with this exit status.
 #[track_caller]
 fn refusal(runtime: &Runtime, line: &str, status: i32) -> String {
-    let output = ask(runtime, line);
-    let complaint = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(status), "{line}: {complaint}");
-    assert_eq!(complaint.lines().count(), 1, "{complaint}");
-    assert!(output.stdout.is_empty());
-    complaint
-        .trim_end()
-        .strip_prefix("pendularm: ")
-        .unwrap()
-        .to_owned()
+    common::complaint(&ask(runtime, line), status)
 }
 
 /// A command that keeps running, and its output line by line.

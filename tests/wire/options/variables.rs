@@ -31,14 +31,7 @@ fn assert_taken(arguments: &[&str], variables: &[(&str, &str)]) {
 
 #[track_caller]
 fn refusal(arguments: &[&str], variables: &[(&str, &str)]) -> String {
-    let output = output(arguments, variables);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{variables:?}: {said}");
-    assert_eq!(said.lines().count(), 1, "{said}");
-    said.trim_end()
-        .strip_prefix("pendularm: ")
-        .unwrap()
-        .to_owned()
+    common::complaint(&output(arguments, variables), 2)
 }
 
 #[test]
