@@ -220,12 +220,11 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
             excess = excess.max(self.excess(order, step, power) / allowance);
             power *= step;
         }
-        if excess > 1.0 {
-            // The terms decrease with at least the power of the first of them, minus 1 for the scale of the comparison.
-            RESERVE * step * pow(excess, -1.0 / length_in_f64(first - 1))
-        } else {
-            step
+        if excess <= 1.0 {
+            return step;
         }
+        // The terms decrease with at least the power of the first of them, minus 1 for the scale of the comparison.
+        RESERVE * step * pow(excess, -1.0 / length_in_f64(first - 1))
     }
 
     /// How many times too large the terms of `order` are in a step \[s\], whose `power` of that order is given.
