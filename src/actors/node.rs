@@ -210,7 +210,7 @@ pub struct Interest {
     pub wanted: bool,
 }
 
-/// Writes a frame for clients. The registry calls it, so the arm's thread does not have to write.
+/// Writes a published frame. The registry calls it, so the arm's thread does not have to write.
 pub type FrameOut = Box<dyn FnOnce() -> Bytes + Send>;
 
 /// A message on a topic. From the node that owns it.
@@ -239,7 +239,7 @@ pub struct Respond {
     /// The client.
     pub connection: ConnectionId,
     /// The whole frame.
-    pub frame: FrameOut,
+    pub frame: Bytes,
     /// Its kind.
     pub kind: FrameKind,
     /// Dropped once the frame is sent, if that is also the end of the call.
@@ -269,11 +269,9 @@ impl Respond {
     /// A status of this level. `id` is that of its frame.
     #[must_use]
     pub fn status(connection: ConnectionId, level: Level, msg: &str, id: Option<&Payload>) -> Self {
-        let (msg, id) = (msg.to_owned(), id.cloned());
-        let write = move || messages::status(level, &msg, id.as_ref());
         Self {
             connection,
-            frame: Box::new(write),
+            frame: messages::status(level, msg, id),
             kind: FrameKind::Status(level),
             done: None,
         }

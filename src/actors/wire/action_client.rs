@@ -1,16 +1,17 @@
 //! Goals of an action: the registry's message to the node of the action, and the way back to the sender.
 //!
 //! **Invariant:** feedback for a slow client may be dropped. The end of a goal is never dropped, and follows all
-//! feedback. Both are passed as values, and written by the registry.
+//! feedback.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use actix::prelude::*;
+use bytes::Bytes;
 use serde::Serialize;
 
 use crate::actors::ConnectionId;
-use crate::actors::node::{Done, FrameKind, FrameOut, Respond};
+use crate::actors::node::{Done, FrameKind, Respond};
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::fields::Rejections;
@@ -116,24 +117,22 @@ impl ActionClient {
     }
 
     /// Sends feedback, if the client gets it.
-    pub fn feed_back(&self, values: impl Serialize + Send + 'static) {
+    pub fn feed_back(&self, values: impl Serialize) {
         if self.wants_feedback {
-            let (action, id) = (Arc::clone(&self.action), self.id.clone());
-            let write = move || messages::action_feedback(&action, id.as_ref(), &values);
-            self.send(FrameKind::Feedback, Box::new(write));
+            let frame = messages::action_feedback(&self.action, self.id.as_ref(), &values);
+            self.send(FrameKind::Feedback, frame);
         }
     }
 
     /// Sends the result of the goal.
-    pub fn conclude(&self, values: impl Serialize + Send + 'static, status: GoalStatus) {
+    pub fn conclude(&self, values: impl Serialize, status: GoalStatus) {
         let result = status != GoalStatus::Unknown;
-        let (action, id) = (Arc::clone(&self.action), self.id.clone());
-        let write =
-            move || messages::action_result(&action, id.as_ref(), &values, status as u8, result);
-        self.send(FrameKind::End, Box::new(write));
+        let (action, id) = (&self.action, self.id.as_ref());
+        let frame = messages::action_result(action, id, &values, status as u8, result);
+        self.send(FrameKind::End, frame);
     }
 
-    fn send(&self, kind: FrameKind, frame: FrameOut) {
+    fn send(&self, kind: FrameKind, frame: Bytes) {
         self.respond.do_send(Respond {
             connection: self.connection,
             frame,
@@ -144,6 +143,6 @@ impl ActionClient {
 
     /// Sends the reason why the goal was not accepted. In this case clients expect a text in `values`.
     pub fn refuse(&self, why: &str) {
-        self.conclude(why.to_owned(), GoalStatus::Unknown);
+        self.conclude(why, GoalStatus::Unknown);
     }
 }

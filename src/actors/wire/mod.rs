@@ -251,10 +251,9 @@ impl Caller {
     /// Answers, unless that has been done.
     fn answer(&mut self, done: Option<Done>, write: impl FnOnce(&Address) -> Bytes) {
         if let Some(address) = self.address.take() {
-            let frame = cover(self.permit.as_ref(), write(&address));
             self.registry.do_send(Respond {
                 connection: self.connection,
-                frame: Box::new(move || frame),
+                frame: cover(self.permit.as_ref(), write(&address)),
                 kind: FrameKind::Answer(address.service()),
                 done,
             });

@@ -634,10 +634,9 @@ impl Performer {
     /// Sends a frame to the client through the registry. Its mailbox may still have a response to an earlier frame,
     /// which must arrive first.
     async fn say(&self, frame: Bytes, kind: FrameKind) -> OpOutcome {
-        let frame = cover(self.permit.as_ref(), frame);
         let respond = Respond {
             connection: self.id,
-            frame: Box::new(move || frame),
+            frame: cover(self.permit.as_ref(), frame),
             kind,
             done: None,
         };

@@ -309,18 +309,17 @@ impl Handler<Respond> for Registry {
         };
         match respond.kind {
             FrameKind::Status(level) if !client.verbosity.wants(level) => {}
-            FrameKind::Status(_) | FrameKind::End => client.send((respond.frame)()),
-            FrameKind::Feedback => client.deliver_feedback((respond.frame)()),
+            FrameKind::Status(_) | FrameKind::End => client.send(respond.frame),
+            FrameKind::Feedback => client.deliver_feedback(respond.frame),
             FrameKind::Answer(service) => {
-                let frame = (respond.frame)();
                 if let Some(tap) = &mut self.tap {
                     tap(Tapped::Answered {
                         to: respond.connection,
                         service,
-                        frame: &frame,
+                        frame: &respond.frame,
                     });
                 }
-                client.respond(frame, Some(service));
+                client.respond(respond.frame, Some(service));
             }
         }
     }

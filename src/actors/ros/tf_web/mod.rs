@@ -231,7 +231,7 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
 
 impl<const N: usize> SubscribeFrames<N> {
     /// Informs a client with a goal of the action of its end.
-    fn end(&self, status: GoalStatus, values: impl Serialize + Send + 'static) {
+    fn end(&self, status: GoalStatus, values: impl Serialize) {
         if let FrameReceiver::Client(client) = &self.by {
             client.conclude(values, status);
         }
