@@ -96,6 +96,8 @@ fn the_last_digit_decides_whether_a_literal_overflows() {
         assert_eq!(strict(least), "null", "{least}");
         assert_eq!(strict(greatest), *greatest);
     }
+    // Zeros follow the digits of a short number.
+    assert_eq!(strict("1.7976931348623158e308"), "1.7976931348623158e308");
     let nearer = format!("{below}.{}", "9".repeat(1000));
     assert_eq!(strict(&nearer), nearer);
     assert_eq!(strict(&format!("{halfway}.{}1", "0".repeat(1000))), "null");
