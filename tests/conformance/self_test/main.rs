@@ -24,7 +24,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use pendularm_conformance::bench::Found;
-use pendularm_conformance::{Row, Rule, Selection, rules, run, totals};
+use pendularm_conformance::{CATEGORIES, Row, Rule, Selection, rules, run, totals};
 use serde_json::Value;
 
 use common::Runtime;
@@ -81,6 +81,7 @@ fn every_rule_has_a_check_and_every_fault_a_rule() {
     let distinct: BTreeSet<&str> = ids.iter().copied().collect();
     let checks: BTreeSet<&str> = rules::checks().map(|(id, _)| *id).collect();
     assert_eq!((ids.len(), &checks), (147, &distinct));
+    assert!(rules::all().all(|rule| CATEGORIES.contains(&rule.category)));
     let planted = faults::all();
     let mut faults = planted.iter().map(|planted| planted.rule);
     assert_eq!(faults.find(|rule| !distinct.contains(rule)), None);
