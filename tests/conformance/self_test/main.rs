@@ -157,7 +157,7 @@ fn a_port_without_a_server_and_a_silent_server_are_reported_soon() {
 #[test]
 fn services_that_never_answer_fail_their_own_rules_alone() {
     let program = Runtime::start();
-    let fault: Fault = Box::new(|_, _, frame| {
+    let fault: Fault = Box::new(|_, frame| {
         let service = frame["service"].as_str().unwrap_or_default();
         if service.starts_with("/ik_") { vec![] } else { vec![frame] }
     });
@@ -171,7 +171,7 @@ fn services_that_never_answer_fail_their_own_rules_alone() {
 fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
     let program = Runtime::start();
     let mut asked = 0;
-    let fault: Fault = Box::new(move |side, _, mut frame| {
+    let fault: Fault = Box::new(move |side, mut frame| {
         if side == Side::Server {
             asked += 1;
             for (at, name) in ["values", "result", "status", "msg"].into_iter().enumerate() {
