@@ -19,8 +19,6 @@ fi
 target=${CARGO_TARGET_DIR:-target}
 if [ "${FORM:-}" = file ]; then
     bash scripts/page.sh
-    export RUNS="$target/runs.txt"
-    "${CARGO:-cargo}" run --locked --quiet --package pendularm-wasm --example runs >"$RUNS"
 elif [ -z "${PENDULARM:-}" ]; then
     "${CARGO:-cargo}" build --locked
     export PENDULARM="$target/debug/pendularm"

@@ -1,8 +1,6 @@
-"""The page in one file: the kernel's bits in this browser, a sandbox around it, and no worker."""
+"""The page in one file: a sandbox around it, and no worker. `tests/page/runs.mjs` compares the kernel's bits."""
 
 import json
-import os
-import pathlib
 import unittest
 
 from alone import FILE
@@ -16,18 +14,6 @@ SHOWN = "document.querySelector('#connection')?.className === 'pill open' && Num
 
 @unittest.skipUnless(IS_FILE, "the page of a server has no kernel")
 class AloneTest(PageTest):
-    def test_runs_and_answers_of_the_kernel_have_the_bits_of_the_native_ones(self):
-        native = pathlib.Path(os.environ["RUNS"]).read_text()
-        self.assertEqual(len(native.splitlines()), 32)
-        ours = self.page.run("""(async () => {
-          const bytes = await (await own("kernel.js")).unpack(document.querySelector("#kernel-module").textContent);
-          const { instance } = await WebAssembly.instantiate(bytes, { env: { milliseconds: () => performance.now() } });
-          const { memory, compare, output } = instance.exports;
-          const length = compare();
-          return new TextDecoder().decode(new Uint8Array(memory.buffer, output(), length));
-        })()""")
-        self.assertEqual(ours, native)
-
     def test_it_runs_in_a_sandboxed_frame_and_its_course_goes_on_there(self):
         page = self.visit("about:blank")
         step = """<script>setTimeout(() => document.querySelector("#course-next").click(), 500);</script>"""

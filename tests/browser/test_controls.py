@@ -244,6 +244,8 @@ class Controls(PageTest):
         self.runtime.call("/arm_sim/reset")
         self.page.key("d")
         self.wait(lambda: self.runtime.next("/joint_states")["velocity"][0] < -0.1, "pushed clockwise")
+        # A push is short, so a busy page may miss it.
+        self.wait(lambda: self.page.key("a") or self.page.text("#legend-drift-name") == "pushed in", "energy that was pushed in")
 
     def test_keys_do_not_act_in_text_fields_and_can_be_switched_off(self):
         self.page.run("document.querySelector('#masses-fields input[type=number]').focus()")

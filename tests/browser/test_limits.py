@@ -120,28 +120,6 @@ class Right(PageTest):
     def shows_setpoint(self, wanted, page=None, why="setpoint"):
         self.wait(lambda: self.setpoint_fields(page) == wanted, f"{why}: {wanted}")
 
-    def test_with_the_controller_off_the_limit_is_that_of_the_free_arm(self):
-        self.runtime.call("/arm_sim/set_integrator", timestep=0.01)
-
-        def limit():
-            values = self.values("/study/stability", gains=FREE)
-            return milliseconds(min(values["timestep_limit_held"], values["timestep_limit_motion"]))
-
-        self.wait(lambda: self.page.text("#out-limit") == limit(), "the limit of the arm left to itself")
-        self.page.until("/hanging|moving/.test(document.querySelector('#verdict').textContent)")
-        self.page.until("document.querySelector('#verdict-pill').textContent === 'stable'")
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.click("#controller")
-        self.page.until("document.querySelector('#verdict-pill').textContent === 'beyond the limit'")
-        self.page.until("document.querySelector('#notice').textContent.includes('at the setpoint (0.00, 0.00) rad')")
-
-    def test_eulers_free_swing_is_stable_at_no_timestep(self):
-        self.page.click("input[value=euler]")
-        self.page.until("document.querySelector('#out-limit').textContent === 'no timestep'")
-        # The arm moves meanwhile, so the loop of the page's request changes.
-        self.page.until("document.querySelector('#verdict-pill').textContent === 'never stable'"
-                        r" && /doubles every [\d.]+ s/.test(document.querySelector('#verdict').textContent)")
-
     def test_each_integrators_button_has_its_limit_in_the_active_loop(self):
         def served(method):
             values = self.values("/study/stability", integrator=method, **self.asked)
@@ -236,17 +214,3 @@ class Right(PageTest):
         clipped = self.page.run("[...document.querySelectorAll('input[type=number]')].filter((one) => one.checkVisibility()"
                                 " && one.scrollWidth > one.clientWidth).map((one) => one.value)")
         self.assertEqual(clipped, [])
-
-    def test_energy_that_the_controller_puts_in_is_no_drift(self):
-        self.page.until("document.querySelector('#legend-drift-name').textContent === 'drift'")
-        self.page.click("#controller")
-        self.page.until("document.querySelector('#legend-drift-name').textContent === 'work'")
-        self.page.click("#controller")
-        self.page.until("document.querySelector('#legend-drift-name').textContent === 'drift'")
-
-        def pushed():
-            # A push is short, so a busy page may miss it.
-            self.page.key("a")
-            return self.page.text("#legend-drift-name") == "pushed in"
-
-        self.wait(pushed, "energy that was pushed in")

@@ -37,14 +37,19 @@ pub(crate) fn states(
     steps: u32,
 ) -> Vec<(f64, f64)> {
     let mut states = vec![(x, v)];
-    let (mut x_carry, mut v_carry) = (0.0, 0.0);
+    let (mut x_carry, mut v_carry, mut evaluations) = (0.0, 0.0, 0);
     for k in 0..steps {
         let t = f64::from(k) * dt;
-        let ([dx], [dv]) = increment(method, |t, [x], [v]| [a(t, *x, *v)], t, &[x], &[v], dt);
+        let acceleration = |t, [x]: &[f64; 1], [v]: &[f64; 1]| {
+            evaluations += 1;
+            [a(t, *x, *v)]
+        };
+        let ([dx], [dv]) = increment(method, acceleration, t, &[x], &[v], dt);
         (x, x_carry) = two_sum(x, dx + x_carry);
         (v, v_carry) = two_sum(v, dv + v_carry);
         states.push((x, v));
     }
+    assert_eq!(evaluations, steps * method.evaluations(), "{method}");
     states
 }
 
@@ -63,52 +68,5 @@ fn any_number_of_steps_agrees_with_50_digits() {
             let off = (got - want).abs();
             assert!(off <= 4.0 * ROUND_OFF * scale, "got {got}: {case}");
         }
-    }
-}
-
-/// The time is right at every stage, for a step that starts anywhere and any number of joints.
-#[test]
-fn every_method_evaluates_at_the_times_of_its_stages_and_no_more() {
-    let (t, h) = (3.0, 0.25);
-    for (method, times) in [
-        (Method::Euler, &[3.0][..]),
-        (Method::Midpoint, &[3.0, 3.125]),
-        (Method::Verlet, &[3.0, 3.25]),
-        (Method::Rk4, &[3.0, 3.125, 3.125, 3.25]),
-    ] {
-        let mut seen = Vec::new();
-        let record = |t: f64, _: &[f64; 3], _: &[f64; 3]| {
-            seen.push(t);
-            [1.0, -2.0, 0.5]
-        };
-        increment(method, record, t, &[0.1, 0.2, 0.3], &[1.0, 2.0, 3.0], h);
-        assert_eq!(seen, times, "{method}");
-        assert_eq!(seen.len(), method.evaluations() as usize, "{method}");
-    }
-}
-
-#[test]
-fn methods_go_by_their_names_and_by_no_others() {
-    for method in Method::ALL {
-        assert_eq!(method.name().parse(), Ok(method));
-        assert_eq!(method.to_string(), method.name());
-    }
-    let expected = "must be one of euler, midpoint, verlet, rk4";
-    for name in ["", "RK4", "rk 4", "euler ", "leapfrog"] {
-        assert_eq!(name.parse::<Method>().unwrap_err().to_string(), expected);
-    }
-}
-
-#[test]
-fn two_sum_leaves_nothing_out() {
-    for (a, b, sum, left_out) in [
-        (1.0, 1e-17, 1.0, 1e-17),
-        (1e-17, 1.0, 1.0, 1e-17),
-        (9007199254740992.0, 1.0, 9007199254740992.0, 1.0),
-        (9007199254740992.0, 3.0, 9007199254740996.0, -1.0),
-        (0.1, 0.2, 0.30000000000000004, -2.7755575615628914e-17),
-        (0.0, -0.0, 0.0, 0.0),
-    ] {
-        assert_eq!(two_sum(a, b), (sum, left_out), "{a} + {b}");
     }
 }

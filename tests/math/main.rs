@@ -15,7 +15,6 @@
 #[cfg(feature = "batch")]
 mod batch;
 mod control;
-mod control_period;
 mod default_gains;
 mod divergence;
 mod dynamics;

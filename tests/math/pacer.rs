@@ -19,20 +19,6 @@ fn seconds(nanoseconds: u64) -> f64 {
     format!("{nanoseconds}e-9").parse().unwrap()
 }
 
-/// Polls every `gap` up to `end`, takes all due steps, and returns their sum.
-fn paced(timestep: f64, gap: u64, end: u64) -> u64 {
-    let mut pacer = Pacer::new(Duration::ZERO, timestep);
-    let mut total = 0;
-    let mut now = 0;
-    while now < end {
-        now = (now + gap).min(end);
-        let due = pacer.due(ns(now));
-        pacer.took(due);
-        total += due;
-    }
-    total
-}
-
 #[test]
 fn the_pace_after_a_stall_is_the_usual_one() {
     let mut pacer = Pacer::new(Duration::ZERO, 0.001);
@@ -72,7 +58,8 @@ fn a_clock_that_runs_backwards_makes_no_step_due() {
 fn absurd_timesteps_do_no_harm() {
     let never = [1e300, f64::MAX, 1e12, f64::INFINITY, f64::NAN, -1.0];
     for timestep in never {
-        assert_eq!(paced(timestep, SECOND / 10, 1000 * SECOND), 0, "{timestep}");
+        let mut pacer = Pacer::new(Duration::ZERO, timestep);
+        assert!((1..60_000).all(|k| pacer.due(ns(k * WAKE)) == 0));
     }
     for timestep in [1e-320, f64::from_bits(1), f64::MIN_POSITIVE, 1e-30, 0.0] {
         let mut pacer = Pacer::new(Duration::ZERO, timestep);

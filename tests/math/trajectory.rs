@@ -126,44 +126,38 @@ fn a_path_is_judged_by_its_path_tolerances_and_at_the_end_by_its_goal_tolerances
         patience: 0.5,
         dwell: Dwell::default(),
     };
-    let at = |position: [f64; 2], velocity: [f64; 2]| State { position, velocity };
-    let rest = [0.0, 0.0];
-    assert_eq!(course.judge(0.5, &at([0.55, 9.0], rest)), Standing::Moving);
-    let Standing::OffPath(excess) = course.judge(0.5, &at([0.25, 0.0], rest)) else {
-        panic!("joint 1 is off");
-    };
-    assert_eq!((excess.joint, excess.error, excess.limit), (0, 0.25, 0.1));
-    let text = "position of joint1 is off by 0.25, more than 0.1";
-    assert_eq!(excess.to_string(), text);
-    let Standing::OffPath(excess) = course.judge(0.5, &at([0.5, 0.0], [0.0, -2.0])) else {
-        panic!("joint 2 is too fast");
-    };
-    assert_eq!((excess.quantity, excess.joint), ("velocity", 1));
-    assert_eq!(course.judge(1.5, &at([0.5, 0.6], rest)), Standing::Moving);
-    let standing = course.judge(1.6, &at([0.5, 0.6], rest));
-    assert!(matches!(standing, Standing::Late(_)));
-    let standing = course.judge(0.5, &at([f64::NAN, 0.0], rest));
-    assert!(matches!(standing, Standing::OffPath(_)));
-
-    // A joint has arrived if it stays. A joint that passes through is late.
-    let there = [0.5, 0.505];
-    for (time, speed, standing) in [
-        (2.0, 0.9, Standing::Moving),
-        (2.0 + SUCCESS_HOLD, 0.9, Standing::Arrived),
-        (3.0, 0.9, Standing::Arrived),
+    let mut standing =
+        |time, position, velocity| match course.judge(time, &State { position, velocity }) {
+            Standing::Moving => "moving".to_owned(),
+            Standing::Arrived => "arrived".to_owned(),
+            Standing::OffPath(excess) => format!("off: {excess}"),
+            Standing::Late(excess) => format!("late: {excess}"),
+        };
+    let (rest, there) = ([0.0, 0.0], [0.5, 0.505]);
+    let far_off = "off: position of joint1 is off by 0.25, more than 0.1";
+    for (time, position, velocity, expected) in [
+        (0.5, [0.55, 9.0], rest, "moving"),
+        (0.5, [0.25, 0.0], rest, far_off),
+        (0.5, [0.5, 0.0], [0.0, -2.0], "off: velocity of joint2"),
+        (0.5, [f64::NAN, 0.0], rest, "off: position of joint1"),
+        (1.5, [0.5, 0.6], rest, "moving"),
+        (1.6, [0.5, 0.6], rest, "late: position of joint2"),
+        // A joint has arrived if it stays. A joint that passes through is late.
+        (2.0, there, [0.9, 9.0], "moving"),
+        (2.0 + SUCCESS_HOLD, there, [0.9, 9.0], "arrived"),
+        (3.0, there, [0.9, 9.0], "arrived"),
+        (3.0, there, [1.1, 9.0], "late: velocity of joint1"),
+        (3.1, there, rest, "moving"),
     ] {
-        assert_eq!(course.judge(time, &at(there, [speed, 9.0])), standing);
+        let found = standing(time, position, velocity);
+        assert!(found.starts_with(expected), "{found} for {expected}");
     }
-    let Standing::Late(excess) = course.judge(3.0, &at(there, [1.1, 9.0])) else {
-        panic!("joint 1 moves");
-    };
-    assert_eq!((excess.quantity, excess.joint), ("velocity", 0));
-    assert_eq!(course.judge(3.1, &at(there, rest)), Standing::Moving);
+    let far = State::at_rest([9.0; 2]);
     course.patience = f64::INFINITY;
-    assert_eq!(course.judge(1e300, &at([9.0; 2], rest)), Standing::Moving);
+    assert_eq!(course.judge(1e300, &far), Standing::Moving);
     course.at_the_end = Tolerance {
         position: [None; 2],
         velocity: [None; 2],
     };
-    assert_eq!(course.judge(1.0, &at([9.0; 2], rest)), Standing::Arrived);
+    assert_eq!(course.judge(1.0, &far), Standing::Arrived);
 }

@@ -3,11 +3,9 @@
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::fmt;
+use std::hash::{DefaultHasher, Hasher};
 
 use tokio::time::Instant;
-
-/// Prefix of a count that is a maximum and not a sum.
-pub const MOST: &str = "most ";
 
 /// Reasons to end a seed early. The number is the exit status of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +41,7 @@ pub struct Court {
     rng: RefCell<fastrand::Rng>,
     began: Instant,
     /// Hash of everything logged so far.
-    hash: Cell<u64>,
+    hash: RefCell<DefaultHasher>,
     /// The log itself, if it is kept.
     log: Option<RefCell<Vec<String>>>,
     failure: RefCell<Option<Failure>>,
@@ -61,7 +59,7 @@ impl Court {
         Self {
             rng: RefCell::new(fastrand::Rng::with_seed(seed)),
             began: Instant::now(),
-            hash: Cell::new(0xcbf2_9ce4_8422_2325),
+            hash: RefCell::default(),
             log: keeps_log.then(RefCell::default),
             failure: RefCell::default(),
             turns: Cell::new(0),
@@ -73,16 +71,10 @@ impl Court {
     /// Logs an event with its virtual time.
     pub fn note(&self, what: &str, detail: &[u8]) {
         let time = self.began.elapsed().as_nanos() as u64;
-        let mut hash = self.hash.get();
-        for byte in time
-            .to_le_bytes()
-            .iter()
-            .chain(what.as_bytes())
-            .chain(detail)
-        {
-            hash = (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
-        }
-        self.hash.set(hash);
+        let mut hash = self.hash.borrow_mut();
+        hash.write_u64(time);
+        hash.write(what.as_bytes());
+        hash.write(detail);
         if let Some(log) = &self.log {
             let detail = String::from_utf8_lossy(&detail[..detail.len().min(300)]);
             log.borrow_mut()
@@ -93,7 +85,7 @@ impl Court {
     /// The hash of the log, and the kept part of the log.
     pub fn record(&self) -> (u64, Vec<String>) {
         let log = self.log.as_ref().map(RefCell::take);
-        (self.hash.get(), log.unwrap_or_default())
+        (self.hash.borrow().finish(), log.unwrap_or_default())
     }
 
     /// Counts an action.
@@ -104,13 +96,6 @@ impl Court {
     /// The count so far.
     pub fn counted(&self, what: &'static str) -> u64 {
         self.tally.borrow().get(what).copied().unwrap_or_default()
-    }
-
-    /// Records a maximum.
-    pub fn at_most(&self, what: &'static str, value: u64) {
-        let mut tally = self.tally.borrow_mut();
-        let most = tally.entry(what).or_default();
-        *most = value.max(*most);
     }
 
     fn drew<T: fmt::Display>(&self, value: T) -> T {

@@ -4,7 +4,6 @@ use std::f64::consts::FRAC_PI_2;
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
-use pendularm::math::simulation::state_after;
 use pendularm::report::experiments::conditioning::{PoseShape, digits_lost};
 use pendularm::report::experiments::nonlinear::{
     PeriodicSwing, arrives, is_carried, move_of, spun,
@@ -37,26 +36,6 @@ fn implicit_baselines_have_their_orders_and_do_not_see_stiffness() {
         assert!(stiff.fewest_stable_steps(solver).unwrap() > 1e5);
         let error = stiff.task.run(solver, 4096, LOST).error;
         assert!(error >= 1e-2, "{method}: {error}");
-    }
-}
-
-#[test]
-fn a_periodic_swing_comes_back() {
-    for amplitude in [0.3, 0.6, 1.2] {
-        let swing = PeriodicSwing::of(amplitude).unwrap();
-        let steps = 20_000;
-        let h = swing.period / f64::from(steps);
-        let mut state = swing.start;
-        for _ in 0..steps {
-            let arm = Arm::<2>::default();
-            state = state_after(&arm, Method::Rk4, &state, &[0.0; 2], h);
-        }
-        let State { position, velocity } = state;
-        for i in 0..2 {
-            // An unstable swing magnifies what rounding leaves of its start.
-            let off = (position[i] - swing.start.position[i]).abs();
-            assert!(off < 1e-8 && velocity[i].abs() < 1e-7, "{amplitude}: {off}");
-        }
     }
 }
 

@@ -7,7 +7,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::forward;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
-use pendularm::study::beside::{Steppable, largest_distance};
+use pendularm::study::beside::largest_distance;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::paused::at_once;
 use pendularm::study::planner::{self, Candidate, MAX_DURATION, PlanError, Planned, Task};
@@ -53,7 +53,7 @@ fn planned_within(span: f64, task: Task<2>, law: &Law<2>) -> Planned {
 }
 
 /// The largest distance of the end effector from the reference within the first seconds, at fifty instants.
-fn error_within<const N: usize>(
+pub(crate) fn error_within<const N: usize>(
     span: f64,
     task: &Task<N>,
     law: &Law<N>,
@@ -156,28 +156,15 @@ fn a_plan_without_a_run_gives_the_reason() {
     assert!(is_reason, "{why}");
 }
 
-/// A run that has diverged.
-struct Diverged(State<2>);
-
-impl Steppable<2> for Diverged {
-    fn advance(&mut self, _: u64) -> u64 {
-        0
-    }
-
-    fn evaluations(&self) -> u64 {
-        0
-    }
-
-    fn state(&self) -> &State<2> {
-        &self.0
-    }
-}
-
 #[test]
 fn a_run_that_diverges_is_infinitely_far_off_however_far_is_allowed() {
-    let arm = Arm::default();
-    let run = || Box::new(Diverged(State::rest()));
-    let reference = || Box::new(ControlLoop::free(arm).simulation(State::rest()));
+    let arm = Arm::<2>::default();
+    let boxed = |timestep| {
+        let control = ControlLoop::free(arm).with_timestep(timestep);
+        Box::new(control.simulation(State::rest()))
+    };
+    // The first step of 1e308 s is not finite.
+    let (run, reference) = (|| boxed(1e308), || boxed(1e-3));
     let off = largest_distance(&arm, (run(), 1_000_000), (reference(), 1), f64::INFINITY);
     assert!(at_once(off).is_infinite());
     let off = largest_distance(&arm, (reference(), 1_000_000), (run(), 1), f64::INFINITY);

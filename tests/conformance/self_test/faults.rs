@@ -12,12 +12,10 @@
 //! | `drop server topic /t`, `twice client op x` | drops or doubles that side's frames with this member |
 //! | `before /s: /t {}; /t {}`, `behind` | adds calls before or behind the calls of a service |
 //! | `one & other` | both |
-//! | `code` | [`by_code`] has it |
 //!
 //! Before the colon, `if path` and `unless path` look for a value, `if path=json` for this one, `only path` for no other member; `from 3`
 //! and `every 3` count the frames. Changes are separated by `; `: `path = json`, `path is json -> json`, `path + number`, `path * number`
-//! (`2 n` is two for each frame so far), `- path`, `pop path`, `keep 1`. `only zero` leaves bad members alone, if there are such, and
-//! `without zero` the others; `zero`, `negative` and `length` are what is bad. `[*1.0]` has that entry for each joint, `last` is the last one.
+//! (`2 n` is two for each frame so far), `- path`, `pop path`, `keep 1`. `[*1.0]` has that entry for each joint, `last` is the last one.
 
 use serde_json::{Value, json};
 
@@ -44,14 +42,11 @@ pub fn all() -> Vec<Planted> {
 impl Planted {
     /// Makes it, for a number of links.
     pub fn fault(&self, links: usize) -> Fault {
-        if self.made == "code" {
-            return by_code(self.rule);
-        }
         let mut parts: Vec<Fault> = self.made.split(" & ").map(|part| one(part, links)).collect();
-        Box::new(move |side, number, frame| {
+        Box::new(move |side, frame| {
             let mut frames = vec![frame];
             for part in &mut parts {
-                frames = frames.into_iter().flat_map(|frame| part(side, number, frame)).collect();
+                frames = frames.into_iter().flat_map(|frame| part(side, frame)).collect();
             }
             frames
         })
@@ -73,16 +68,16 @@ fn one(text: &'static str, links: usize) -> Fault {
         ["after", calls, service] => {
             let (mut seen, calls) = (0, calls.parse::<usize>().expect(text));
             let mut change = changed(Side::Server, "publish", "/joint_states", "/msg", &[], changes, links);
-            Box::new(move |side, number, frame| {
+            Box::new(move |side, frame| {
                 seen += usize::from(side == Side::Client && is(&frame, "service", service));
-                if seen < calls { vec![frame] } else { change(side, number, frame) }
+                if seen < calls { vec![frame] } else { change(side, frame) }
             })
         }
         [how @ ("drop" | "twice"), of, name, ..] => {
             // The rest of the line may have spaces.
             let value = head.splitn(4, ' ').last().expect(text);
             let pointer = format!("/{name}");
-            Box::new(move |side, _, frame| {
+            Box::new(move |side, frame| {
                 let is_of = matches!((of, side), ("server", Side::Server) | ("client", Side::Client));
                 match frame.pointer(&pointer).is_some_and(|found| found == value) && is_of {
                     true if how == "drop" => vec![],
@@ -98,7 +93,7 @@ fn one(text: &'static str, links: usize) -> Fault {
                 json!({"op": "call_service", "id": "proxy", "service": service, "args": json_of(args, links)})
             };
             let calls: Vec<Value> = changes.split("; ").map(call).collect();
-            Box::new(move |side, _, frame| {
+            Box::new(move |side, frame| {
                 let is_call = side == Side::Client && is(&frame, "service", service);
                 if !is_call || !holds(&conditions, &frame["args"], 0) {
                     return vec![frame];
@@ -123,7 +118,7 @@ fn changed(
 ) -> Fault {
     let (mut count, conditions) = (0, conditions.to_vec());
     let name = if op == "publish" { "topic" } else { "service" };
-    Box::new(move |side, _, mut frame| {
+    Box::new(move |side, mut frame| {
         if side == of
             && is(&frame, "op", op)
             && is(&frame, name, about)
@@ -221,65 +216,6 @@ fn remove(subject: &mut Value, change: &str, links: usize) {
         "-" => drop(place(subject, path, links).and_then(Value::as_object_mut).and_then(|members| members.remove(name))),
         "pop" => drop(place(subject, what, links).and_then(Value::as_array_mut).and_then(Vec::pop)),
         "keep" => subject.as_array_mut().into_iter().for_each(|entries| entries.truncate(what.parse().expect(what))),
-        "only" | "without" => {
-            if let Some(members) = subject.as_object_mut()
-                && members.values().any(|value| is_bad(value, what, links))
-            {
-                members.retain(|_, value| is_bad(value, what, links) == (how == "only"));
-            }
-        }
         _ => panic!("no change: {change}"),
-    }
-}
-
-fn is_bad(value: &Value, what: &str, links: usize) -> bool {
-    let numbers: Vec<f64> =
-        value.as_array().map_or(vec![value.as_f64()], |array| array.iter().map(Value::as_f64).collect()).into_iter().flatten().collect();
-    match what {
-        "zero" => numbers.iter().any(|number| *number <= 0.0),
-        "negative" => numbers.iter().any(|number| *number < 0.0),
-        _ => value.as_array().is_some_and(|array| array.len() != links),
-    }
-}
-
-/// Faults that remember what has happened.
-fn by_code(rule: &str) -> Fault {
-    const TRAJECTORY: &str = "/joint_trajectory";
-    let (mut count, mut kept) = (0, None);
-    let mut happened = false;
-    match rule {
-        "envelope-5" => Box::new(|side, number, frame| {
-            let is_third = side == Side::Server && number == 2 && is(&frame, "topic", "/joint_states");
-            if is_third { vec![] } else { vec![frame] }
-        }),
-        "envelope-7" => Box::new(move |side, _, frame| {
-            happened |= side == Side::Client && frame.is_string();
-            if side == Side::Server && happened { vec![] } else { vec![frame] }
-        }),
-        "checkpoint-12" => Box::new(move |side, _, frame| {
-            let is_rejection = is(&frame, "service", "/arm_sim/integration_step") && frame["result"] == false;
-            count += usize::from(side == Side::Server && is_rejection);
-            if side == Side::Server && count > 10 { vec![] } else { vec![frame] }
-        }),
-        "trajectory-8" => Box::new(move |side, _, frame| {
-            if side == Side::Client && is(&frame, "service", "/pid_controller/enable") && frame["args"]["data"].is_boolean() {
-                happened = frame["args"]["data"] == false;
-            }
-            let is_lost = side == Side::Client && is(&frame, "topic", TRAJECTORY) && happened;
-            if is_lost { vec![] } else { vec![frame] }
-        }),
-        "states-1" => Box::new(move |side, _, frame| {
-            let is_state = side == Side::Server && is(&frame, "topic", "/joint_states");
-            count += usize::from(is_state);
-            if is_state && count % 30 != 1 { vec![] } else { vec![frame] }
-        }),
-        "reset-3" => Box::new(move |side, _, frame| {
-            if side == Side::Client && is(&frame, "topic", TRAJECTORY) && is(&frame, "op", "publish") {
-                kept = Some(frame.clone());
-            }
-            let again = kept.clone().filter(|_| side == Side::Client && is(&frame, "service", "/arm_sim/reset"));
-            std::iter::once(frame).chain(again).collect()
-        }),
-        _ => panic!("no code for {rule}"),
     }
 }

@@ -24,7 +24,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use pendularm_conformance::bench::Found;
-use pendularm_conformance::{Row, Rule, Selection, rules, run, totals};
+use pendularm_conformance::{CATEGORIES, Row, Rule, Selection, rules, run, totals};
 use serde_json::Value;
 
 use common::Runtime;
@@ -81,6 +81,7 @@ fn every_rule_has_a_check_and_every_fault_a_rule() {
     let distinct: BTreeSet<&str> = ids.iter().copied().collect();
     let checks: BTreeSet<&str> = rules::checks().map(|(id, _)| *id).collect();
     assert_eq!((ids.len(), &checks), (147, &distinct));
+    assert!(rules::all().all(|rule| CATEGORIES.contains(&rule.category)));
     let planted = faults::all();
     let mut faults = planted.iter().map(|planted| planted.rule);
     assert_eq!(faults.find(|rule| !distinct.contains(rule)), None);
@@ -156,7 +157,7 @@ fn a_port_without_a_server_and_a_silent_server_are_reported_soon() {
 #[test]
 fn services_that_never_answer_fail_their_own_rules_alone() {
     let program = Runtime::start();
-    let fault: Fault = Box::new(|_, _, frame| {
+    let fault: Fault = Box::new(|_, frame| {
         let service = frame["service"].as_str().unwrap_or_default();
         if service.starts_with("/ik_") { vec![] } else { vec![frame] }
     });
@@ -170,7 +171,7 @@ fn services_that_never_answer_fail_their_own_rules_alone() {
 fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
     let program = Runtime::start();
     let mut asked = 0;
-    let fault: Fault = Box::new(move |side, _, mut frame| {
+    let fault: Fault = Box::new(move |side, mut frame| {
         if side == Side::Server {
             asked += 1;
             for (at, name) in ["values", "result", "status", "msg"].into_iter().enumerate() {

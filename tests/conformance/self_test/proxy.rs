@@ -16,9 +16,8 @@ pub enum Side {
     Server,
 }
 
-/// Converts a frame into the forwarded frames: none, one or more. Its arguments are the side and the number of the
-/// connection. A line that is not JSON is passed as a text.
-pub type Fault = Box<dyn FnMut(Side, usize, Value) -> Vec<Value> + Send>;
+/// Converts a frame of a side into the forwarded frames: none, one or more. A line that is not JSON is passed as a text.
+pub type Fault = Box<dyn FnMut(Side, Value) -> Vec<Value> + Send>;
 
 /// A proxy. Its threads end with the connections.
 pub struct Proxy {
@@ -33,7 +32,7 @@ impl Proxy {
         let address = listener.local_addr().unwrap().to_string();
         let (server, fault) = (server.to_owned(), Arc::new(Mutex::new(fault)));
         thread::spawn(move || {
-            for (number, client) in listener.incoming().flatten().enumerate() {
+            for client in listener.incoming().flatten() {
                 let Ok(server) = TcpStream::connect(&server) else {
                     return;
                 };
@@ -42,20 +41,20 @@ impl Proxy {
                 }
                 let (from, to) = (client.try_clone().unwrap(), server.try_clone().unwrap());
                 let shared = Arc::clone(&fault);
-                thread::spawn(move || pass(from, to, Side::Client, number, &shared));
+                thread::spawn(move || pass(from, to, Side::Client, &shared));
                 let shared = Arc::clone(&fault);
-                thread::spawn(move || pass(server, client, Side::Server, number, &shared));
+                thread::spawn(move || pass(server, client, Side::Server, &shared));
             }
         });
         Self { address }
     }
 }
 
-fn pass(from: TcpStream, mut to: TcpStream, side: Side, number: usize, fault: &Mutex<Fault>) {
+fn pass(from: TcpStream, mut to: TcpStream, side: Side, fault: &Mutex<Fault>) {
     for line in BufReader::new(from).lines() {
         let Ok(line) = line else { break };
         let frame = serde_json::from_str(&line).unwrap_or(Value::String(line));
-        let frames = fault.lock().unwrap()(side, number, frame);
+        let frames = fault.lock().unwrap()(side, frame);
         let mut text = String::new();
         for frame in frames {
             text += &frame.as_str().map_or_else(|| frame.to_string(), str::to_owned);

@@ -10,34 +10,35 @@ pub fn member<'a>(value: &'a Value, path: &str) -> Result<&'a Value, String> {
     value.pointer(&format!("/{path}")).ok_or_else(|| format!("no {path} in {}", beginning(&value.to_string())))
 }
 
+/// The value at a path as `read` has it.
+fn as_kind<'a, T>(value: &'a Value, path: &str, kind: &str, read: impl FnOnce(&'a Value) -> Option<T>) -> Result<T, String> {
+    let found = member(value, path)?;
+    read(found).ok_or_else(|| format!("{path} is no {kind}: {}", beginning(&found.to_string())))
+}
+
+fn finite(value: &Value) -> Option<f64> {
+    value.as_f64().filter(|number| number.is_finite())
+}
+
 /// The finite number at a path.
 pub fn number(value: &Value, path: &str) -> Result<f64, String> {
-    let found = member(value, path)?;
-    found.as_f64().filter(|number| number.is_finite()).ok_or_else(|| format!("{path} is no number: {}", beginning(&found.to_string())))
+    as_kind(value, path, "number", finite)
 }
 
 /// The boolean at a path.
 pub fn boolean(value: &Value, path: &str) -> Result<bool, String> {
-    let found = member(value, path)?;
-    found.as_bool().ok_or_else(|| format!("{path} is no boolean: {}", beginning(&found.to_string())))
+    as_kind(value, path, "boolean", Value::as_bool)
 }
 
 /// The text at a path.
 pub fn text<'a>(value: &'a Value, path: &str) -> Result<&'a str, String> {
-    let found = member(value, path)?;
-    found.as_str().ok_or_else(|| format!("{path} is no text: {}", beginning(&found.to_string())))
+    as_kind(value, path, "text", Value::as_str)
 }
 
 /// The array of finite numbers at a path.
 pub fn numbers(value: &Value, path: &str) -> Result<Vec<f64>, String> {
-    let found = member(value, path)?;
-    let entries = found.as_array().ok_or_else(|| format!("{path} is no array: {}", beginning(&found.to_string())))?;
-    let mut numbers = Vec::with_capacity(entries.len());
-    for (at, entry) in entries.iter().enumerate() {
-        let number = entry.as_f64().filter(|number| number.is_finite());
-        numbers.push(number.ok_or_else(|| format!("{path}[{at}] is no number: {}", beginning(&entry.to_string())))?);
-    }
-    Ok(numbers)
+    let entries = as_kind(value, path, "array", Value::as_array)?;
+    (0..entries.len()).map(|at| number(value, &format!("{path}/{at}"))).collect()
 }
 
 /// The array of `count` finite numbers at a path.

@@ -1,7 +1,7 @@
 //! The `function` field of `/arm_sim/integration_step`, sentence by sentence of the specification and the contract.
 //!
 //! [`accepted`] and [`rejected`] hold the sentences, [`size`] the texts that would break a parser that recurses,
-//! [`properties`] the routes that share no code with the parser.
+//! [`properties`] any expressions and texts.
 //!
 //! **Invariant:** values are compared exactly: the expected ones are whole numbers or binary fractions, or take the same
 //! floating-point operations in the same order.

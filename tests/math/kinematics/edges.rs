@@ -2,67 +2,55 @@
 
 use super::*;
 
-/// Every place where a reach ends: lengths, a target exactly there, and the outward direction along it.
-fn edges() -> Vec<(Vec<f64>, Target, DVec2)> {
-    let mut edges = Vec::new();
-    for scale in [1e-6, 1.0, 1e6] {
-        for bearing in [0.0, 0.7, 2.0, -1.3, PI] {
-            let along = DVec2::from_angle(bearing);
-            let mut edge = |lengths: &[f64], distance: f64, outward: DVec2| {
-                let lengths = lengths.iter().map(|l| l * scale).collect();
-                let DVec2 { x, y } = scale * distance * along;
-                edges.push((lengths, at(x, y), outward));
-            };
-            edge(&[1.0, 1.0], 2.0, along);
-            edge(&[2.0, 0.5], 2.5, along);
-            edge(&[2.0, 0.5], 1.5, -along);
-            edge(&[0.5, 2.0], 1.5, -along);
-            edge(&[1.0, 0.5, 0.3], 1.8, along);
-            edge(&[2.0, 0.5, 0.3], 1.2, -along);
-            edge(&[0.3, 0.5, 2.0], 1.2, -along);
-            // The wrist's edges, with the last link across.
-            let across = bearing + FRAC_PI_2;
-            for (lengths, wrist, outward) in [
-                ([1.0, 0.5, 0.3], 1.5, along),
-                ([1.0, 0.5, 0.3], 0.5, -along),
-            ] {
-                let DVec2 { x, y } = scale * (wrist * along + 0.3 * DVec2::from_angle(across));
-                let lengths = lengths.map(|l| l * scale).to_vec();
-                edges.push((lengths, aimed(x, y, across), outward));
-            }
-        }
+/// Around a target at an edge of the reach, towards outside.
+fn check_edge<const N: usize>(
+    scale: f64,
+    lengths: [f64; N],
+    (place, orientation): (DVec2, Option<f64>),
+    outward: DVec2,
+) {
+    let lengths = lengths.map(|length| scale * length);
+    let sum: f64 = lengths.iter().sum();
+    let present = std::array::from_fn(|i| [0.3, -0.4, 1.0][i]);
+    let off = |share: f64| {
+        let position = scale * place + share * BOUNDARY * sum * outward;
+        let target = Target {
+            position,
+            orientation,
+        };
+        solve(&lengths, &present, &target).map(|q| miss(&lengths, &q, &target))
+    };
+    for share in [-1.0, -0.5, -1e-3, -1e-6, 0.0, 1e-6, 1e-3, 0.5, 0.999] {
+        let told = format!("{lengths:?} {place} {share}");
+        let off = off(share).unwrap_or_else(|e| panic!("{told}: {e}"));
+        // On the boundary: the error is the target's distance from it, and no more.
+        let error = (off - BOUNDARY * f64::max(share, 0.0)).abs();
+        assert!(error <= 1e-15, "{told}: {off:e} off");
     }
-    edges
-}
-
-fn solve_any(lengths: &[f64], target: &Target) -> Result<f64, Unreachable> {
-    match *lengths {
-        [l1, l2] => solve(&[l1, l2], &[0.3, -0.4], target).map(|q| miss(&[l1, l2], &q, target)),
-        [l1, l2, l3] => {
-            solve(&[l1, l2, l3], &[0.3, -0.4, 1.0], target).map(|q| miss(&[l1, l2, l3], &q, target))
-        }
-        _ => panic!("{} links", lengths.len()),
+    for share in [1.001, 2.0, 1e3, 1e6] {
+        assert!(off(share).is_err(), "{lengths:?} {place} {share}");
     }
 }
 
 #[test]
 fn a_target_within_a_billionth_of_the_arm_outside_its_reach_is_the_boundary_and_beyond_refused() {
-    for (lengths, edge, outward) in edges() {
-        let sum: f64 = lengths.iter().sum();
-        let moved = |share: f64| Target {
-            position: edge.position + share * BOUNDARY * sum * outward,
-            ..edge
-        };
-        for share in [-1.0, -0.5, -1e-3, -1e-6, 0.0, 1e-6, 1e-3, 0.5, 0.999] {
-            let off = solve_any(&lengths, &moved(share));
-            let off = off.unwrap_or_else(|e| panic!("{lengths:?} {edge:?} {share}: {e}"));
-            // On the boundary: the error is the target's distance from it, and no more.
-            let error = (off - BOUNDARY * f64::max(share, 0.0)).abs();
-            assert!(error <= 1e-15, "{lengths:?} {edge:?} {share}: {off:e} off");
-        }
-        for share in [1.001, 2.0, 1e3, 1e6] {
-            let solved = solve_any(&lengths, &moved(share));
-            assert!(solved.is_err(), "{lengths:?} {edge:?} {share}");
+    for scale in [1e-6, 1.0, 1e6] {
+        for bearing in [0.0, 0.7, 2.0, -1.3, PI] {
+            let out = DVec2::from_angle(bearing);
+            check_edge(scale, [1.0, 1.0], (2.0 * out, None), out);
+            check_edge(scale, [2.0, 0.5], (2.5 * out, None), out);
+            check_edge(scale, [2.0, 0.5], (1.5 * out, None), -out);
+            check_edge(scale, [0.5, 2.0], (1.5 * out, None), -out);
+            check_edge(scale, [1.0, 0.5, 0.3], (1.8 * out, None), out);
+            check_edge(scale, [2.0, 0.5, 0.3], (1.2 * out, None), -out);
+            check_edge(scale, [0.3, 0.5, 2.0], (1.2 * out, None), -out);
+            // The wrist's edges, with the last link across.
+            let across = bearing + FRAC_PI_2;
+            let link = 0.3 * DVec2::from_angle(across);
+            for (wrist, outward) in [(1.5 * out, out), (0.5 * out, -out)] {
+                let place = (wrist + link, Some(across));
+                check_edge(scale, [1.0, 0.5, 0.3], place, outward);
+            }
         }
     }
 }

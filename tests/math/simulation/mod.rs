@@ -1,65 +1,97 @@
-//! The live loop: motion, determinism, and the effects of each call.
+//! The live loop: the exact steps of its inputs. [`rules`] has any inputs in any order.
 
-mod changes;
-mod motion;
 mod rules;
-mod stepping;
 
 use pendularm::math::arm::{Arm, State};
-use pendularm::math::dynamics::forward_dynamics;
-use pendularm::math::integrator::{Method, increment, two_sum};
-use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::Simulation;
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::Gains;
+use pendularm::math::simulation::{ControlPeriod, Simulation};
 
-use crate::stored::gains;
-
-fn no_gains<const N: usize>() -> Gains<N> {
-    gains([0.0; N], [0.0; N], [0.0; N])
-}
-
-/// Steps without effort, with only the method and the dynamics, summed like in the simulation.
-struct Offline<const N: usize> {
-    arm: Arm<N>,
-    method: Method,
-    dt: f64,
-    state: State<N>,
-    carry: State<N>,
-}
-
-impl<const N: usize> Offline<N> {
-    fn new(arm: Arm<N>, method: Method, dt: f64, state: State<N>) -> Self {
-        Self {
-            arm,
-            method,
-            dt,
-            state,
-            carry: State::rest(),
-        }
-    }
-
-    fn step(&mut self) {
-        let State {
-            position: q,
-            velocity: v,
-        } = &mut self.state;
-        let acceleration =
-            |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(&self.arm, q, v, &[0.0; N]);
-        let (dq, dv) = increment(self.method, acceleration, 0.0, q, v, self.dt);
-        for i in 0..N {
-            (q[i], self.carry.position[i]) = two_sum(q[i], dq[i] + self.carry.position[i]);
-            (v[i], self.carry.velocity[i]) = two_sum(v[i], dv[i] + self.carry.velocity[i]);
-        }
+#[test]
+fn a_period_is_the_nearest_number_of_steps_and_one_at_least() {
+    for (period, timestep, steps) in [
+        (0.0, 1e-3, 1),
+        (4e-4, 1e-3, 1),
+        (1.4e-3, 1e-3, 1),
+        (1.6e-3, 1e-3, 2),
+        (0.01, 1e-4, 100),
+        (0.01, 3e-3, 3),
+        (f64::MAX, f64::MIN_POSITIVE, 1 << 53),
+    ] {
+        let delay = false;
+        let period = ControlPeriod { period, delay };
+        assert_eq!(period.steps(timestep), steps, "{period:?} of {timestep}");
+        let length = steps as f64 * timestep;
+        assert_eq!(period.effective(timestep).to_bits(), length.to_bits());
     }
 }
 
-/// Two links swinging under control, away from anything special.
-fn moving(method: Method) -> Simulation<2> {
-    let mut simulation = Simulation::new(Arm::default(), Gains::default());
-    simulation.set_method(method);
-    simulation.set_setpoint(Setpoint {
-        position: [0.7, -1.1],
-        velocity: [0.1, 0.0],
-    });
-    simulation.enable(true);
-    simulation
+/// A stretched arm without gravity turns evenly. A rounding error in every step would add up to some 1e-10 rad.
+#[test]
+fn the_rounding_errors_of_steps_do_not_add_up() {
+    for method in Method::ALL {
+        let mut simulation = Simulation::<2>::new(Arm::default().weightless(), Gains::default());
+        simulation.set_method(method);
+        simulation.set_state(State {
+            position: [0.0; 2],
+            velocity: [1.0, 0.0],
+        });
+        simulation.advance(100_000);
+        let off = simulation.state().position[0] - simulation.time();
+        assert!(off.abs() < 1e-13, "{method}: {off}");
+    }
+}
+
+#[test]
+fn a_state_that_is_put_in_has_no_rounding_error_of_the_old_one() {
+    let mut simulation = Simulation::<2>::new(Arm::default(), Gains::default());
+    simulation.advance(1234);
+    assert_ne!(simulation.checkpoint().carry, State::rest());
+    simulation.set_state(*simulation.clone().state());
+    assert_eq!(simulation.checkpoint().carry, State::rest());
+}
+
+/// How many steps have the push in their effort.
+fn pushed_steps(timestep: f64, duration: f64, before: u64) -> u64 {
+    let mut simulation = Simulation::<2>::new(Arm::default(), Gains::default());
+    simulation.set_timestep(timestep);
+    simulation.advance(before);
+    simulation.disturb([1.0, 0.0], duration);
+    let mut pushed = 0;
+    for _ in 0..200 {
+        simulation.step();
+        pushed += u64::from(simulation.effort()[0] != 0.0);
+    }
+    pushed
+}
+
+/// Steps begin at 0, dt, 2 dt, ...: `duration / dt` of them before `duration`, rounded up. In binary 1.1 / 0.1 is a
+/// little more than 11.
+#[test]
+fn a_disturbance_is_in_every_step_that_begins_within_its_time() {
+    for (timestep, durations) in [
+        (0.1, [(1.1, 11), (0.3, 3), (0.7, 7), (0.25, 3)]),
+        (0.001, [(0.1, 100), (1e-9, 1), (5e-324, 1), (f64::MAX, 200)]),
+    ] {
+        for (duration, steps) in durations {
+            for before in [0, 1, 7, 1000] {
+                let pushed = pushed_steps(timestep, duration, before);
+                assert_eq!(pushed, steps, "{timestep} {duration} {before}");
+            }
+        }
+    }
+}
+
+/// The arm has stood still for 2^30 s; numbers there are 2^-22 s apart, which is a step, and the push is shorter.
+#[test]
+fn a_disturbance_shorter_than_the_clock_can_tell_is_in_one_step() {
+    let mut simulation = Simulation::<2>::new(Arm::default().weightless(), Gains::default());
+    simulation.set_timestep(2.0_f64.powi(30));
+    simulation.advance(1);
+    simulation.set_timestep(2.0_f64.powi(-22));
+    simulation.disturb([1.0, 0.0], 1e-9);
+    for effort in [[1.0, 0.0], [0.0, 0.0]] {
+        simulation.advance(1);
+        assert_eq!(simulation.effort(), &effort);
+    }
 }

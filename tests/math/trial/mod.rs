@@ -3,15 +3,12 @@
 //! `transcripts.txt` has the transitions. A transcript begins with `# ` and its statement, and plays on a new trial, or with `#+ ` on one
 //! whose first goal is active. Each line of it is `event | commands | status`. The `n`th goal has ticket `n`, and target `n`; its id is `gn`.
 
-mod properties;
 mod sampling;
 
 use glam::dvec2;
 use pendularm::math::goal::{Criteria, Outcome};
 use pendularm::math::kinematics::Target;
-use pendularm::math::trial::{
-    ActionStatus, Changes, Conclusion, Rejection, Status, Trial, TrialCommand,
-};
+use pendularm::math::trial::{Changes, Conclusion, Rejection, Trial, TrialCommand};
 
 const TRANSCRIPTS: &str = include_str!("transcripts.txt");
 
@@ -29,14 +26,6 @@ fn ended(goal_id: &str, outcome: Outcome) -> Conclusion {
         outcome,
         final_distance: 0.015,
     }
-}
-
-/// No goal in flight, and none shown.
-fn assert_cleared(status: &Status) {
-    assert_eq!(status.target, None);
-    assert_eq!(status.error, None);
-    assert_eq!(status.desired_positions, None);
-    assert_eq!(status.action_status, ActionStatus::Idle);
 }
 
 /// Applies settings from a text `name value name value`.

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::{nested, outcomes, read};
+use super::{nested, read};
 
 /// Streams in which the characters that matter to the reader are frequent.
 fn stream() -> impl Strategy<Value = Vec<u8>> {
@@ -40,19 +40,5 @@ proptest! {
         cuts in proptest::collection::vec(any::<prop::sample::Index>(), 0..12),
     ) {
         prop_assert_eq!(read(cut(&stream, &cuts)), read([&stream[..]]));
-    }
-
-    #[test]
-    fn frames_that_were_written_are_read_again(
-        values in proptest::collection::vec(any::<(String, f64)>(), 0..8),
-        newline in any::<bool>(),
-    ) {
-        let frames: Vec<String> = values
-            .iter()
-            .map(|(text, number)| serde_json::json!({"text": text, "number": [number]}).to_string())
-            .collect();
-        let stream = frames.join(if newline { "\n" } else { "" });
-        let read: Vec<String> = outcomes(stream.as_bytes()).into_iter().map(Result::unwrap).collect();
-        prop_assert_eq!(read, frames);
     }
 }

@@ -6,6 +6,7 @@ mod age;
 mod costs;
 mod properties;
 mod series;
+mod throttles;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

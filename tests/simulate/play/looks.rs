@@ -98,13 +98,11 @@ impl Course {
             && let Expect::Computed { is_short, .. } = next.expect
         {
             let taken = turns - next.turns.max(one.computed);
-            court.at_most("most turns that a computation waits", taken);
             let clients = (self.honest.len() + self.hostile.len()) as u64;
             // Without long frames a short computation gets its turns soon, for any load by others. Frames in small
             // pieces delay the client's next frame.
             let is_wide = self.plan.room >= 1 << 16 && self.plan.piece >= 1 << 16;
             let each = if is_wide && is_short {
-                court.at_most("most turns that a short one waits", taken);
                 SHORT_TURNS
             } else {
                 COMPUTED_TURNS

@@ -258,12 +258,7 @@ impl Course {
 
 /// Processor time of this thread so far, if the system has it.
 fn processor_time() -> Option<Duration> {
-    processor_time_of("thread-self")
-}
-
-/// Processor time of a thread, or of a process's first, so far.
-pub fn processor_time_of(thread: &str) -> Option<Duration> {
-    let text = std::fs::read_to_string(format!("/proc/{thread}/schedstat")).ok()?;
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     let nanoseconds = text.split(' ').next()?.parse().ok()?;
     Some(Duration::from_nanos(nanoseconds))
 }

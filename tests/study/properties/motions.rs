@@ -2,10 +2,8 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec2;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
-use pendularm::math::kinematics::forward;
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::paused::at_once;
@@ -13,7 +11,7 @@ use pendularm::study::planner::{Task, plan};
 use pendularm::study::rollout::{RolloutRequest, rollout};
 
 use super::{Dice, Tally, cases, property, run, tells};
-use crate::reference::state;
+use crate::planner::error_within;
 
 /// A state to begin with, and a time for which the motion from there is known.
 fn start<const N: usize>(dice: &mut Dice, arm: &Arm<N>) -> (State<N>, f64) {
@@ -42,18 +40,8 @@ fn a_plan_keeps_its_error<const N: usize>(case: u64, tally: &mut Tally) {
         return;
     };
     for candidate in &planned.candidates {
-        let control = task.control.with_method(candidate.method);
-        let mut live = control.with_timestep(candidate.timestep).simulation(start);
-        let steps = (duration / candidate.timestep).round() as usize;
-        let every = (steps / 10).max(1);
-        let spacing = candidate.timestep * every as f64;
-        let truth = ReferenceMotion::new(&arm, &start, &Law::FREE, duration);
-        let tip = |state: &State<N>| -> DVec2 { forward(arm.lengths(), &state.position).position };
-        for sample in 1..=steps / every {
-            live.advance(every as u64);
-            let off = tip(live.state()).distance(tip(&state(&truth, spacing * sample as f64)));
-            assert!(off <= error, "case {case}: {off:e} {task:?} {candidate:?}");
-        }
+        let off = error_within(duration, &task, &Law::FREE, candidate);
+        assert!(off <= error, "case {case}: {off:e} {task:?} {candidate:?}");
         tally.tried += 1;
     }
 }

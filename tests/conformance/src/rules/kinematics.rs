@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use fastrand::Rng;
 use serde_json::{Value, json};
 
 use crate::arm::Arm;
@@ -16,9 +17,9 @@ pub const CHECKS: &[Check] = &[
     ("ik-1", round_trip),
     ("ik-2", round_trip),
     ("ik-3", |bench| {
-        let (mut draws, arm) = (Draws(8), Arm::of(bench.links, GRAVITY));
+        let (mut draws, arm) = (Rng::with_seed(8), Arm::of(bench.links, GRAVITY));
         for _ in 0..10 {
-            let (x, y, _) = arm.end_effector(&draws.pose(bench.links));
+            let (x, y, _) = arm.end_effector(&pose(&mut draws, bench.links));
             reaches(bench, &arm, &json!({"x": x, "y": y}), (x, y), None, 1e-6)?;
         }
         Ok("10 targets reached".to_owned())
@@ -92,21 +93,9 @@ pub const CHECKS: &[Check] = &[
     }),
 ];
 
-/// Numbers in [0, 1) that are the same in every run.
-#[derive(Debug)]
-struct Draws(u64);
-
-impl Draws {
-    fn next(&mut self) -> f64 {
-        // Knuth's constants for 64 bits; the upper bits are the good ones.
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let upper = u32::try_from(self.0 >> 32).unwrap_or_default();
-        f64::from(upper) / 4_294_967_296.0
-    }
-
-    fn pose(&mut self, links: usize) -> Vec<f64> {
-        (0..links).map(|_| TAU * (self.next() - 0.5)).collect()
-    }
+/// Any pose of an arm.
+fn pose(draws: &mut Rng, links: usize) -> Vec<f64> {
+    (0..links).map(|_| TAU * (draws.f64() - 0.5)).collect()
 }
 
 /// The difference of two angles in whole turns taken away.
@@ -131,13 +120,13 @@ fn target(bench: &Bench, x: f64, y: f64, phi: f64) -> Value {
 }
 
 fn round_trip(bench: &mut Bench) -> Got {
-    let mut draws = Draws(7);
+    let mut draws = Rng::with_seed(7);
     let uneven = Arm { lengths: [0.9, 0.7, 0.4].into_iter().take(bench.links).collect(), ..Arm::of(bench.links, GRAVITY) };
     let mut last = Vec::new();
     for arm in [Arm::of(bench.links, GRAVITY), uneven] {
         bench.set_arm(&arm)?;
         for _ in 0..20 {
-            let pose = draws.pose(bench.links);
+            let pose = pose(&mut draws, bench.links);
             let (x, y, phi) = arm.end_effector(&pose);
             let target = target(bench, x, y, phi);
             let phi = (bench.links == 3).then_some(phi);

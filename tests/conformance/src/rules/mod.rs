@@ -11,17 +11,17 @@ pub mod pid;
 pub mod topics;
 pub mod trials;
 
-use crate::{Category, Rule};
+use crate::Rule;
 
 /// A heading names a category. A row has the id, with the number of links if the rule is for one, the rule and the expected outcome.
 const RULES: &str = include_str!("rules.txt");
 
 /// All rules, in the order of the specification's sections.
 pub fn all() -> impl Iterator<Item = Rule> {
-    let mut category = Category::Dynamics;
+    let mut category = "";
     RULES.lines().filter_map(move |line| {
         if let Some(name) = line.strip_prefix("# ") {
-            category = Category::ALL.into_iter().find(|one| one.name() == name)?;
+            category = name;
             return None;
         }
         let mut cells = line.split(" | ");
