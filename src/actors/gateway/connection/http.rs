@@ -12,10 +12,9 @@ use tokio::time::Instant;
 use super::admission::HeldSlot;
 use super::session::{ClientSession, HeldPlace, Opened};
 use super::transport::Transport;
-use super::websocket::WebSocket;
-use crate::actors::gateway::messages::{Outlets, Refused, Request};
+use crate::actors::gateway::registry::{Outlets, Refused, Request};
 use crate::protocol::messages::ErrorForm;
-use crate::protocol::op::{Op, Verbosity};
+use crate::protocol::op::{Incoming, Op, Verbosity};
 use crate::web::serve::{self, Gate};
 
 /// A client without a place: its outlets, its slot, and the reason. `None` means that the token is missing.
@@ -89,17 +88,19 @@ impl ClientSession {
         let place = gate.place.take()?;
         let quiet = Request {
             from: place.id(),
-            id: None,
-            op: Op::SetLevel {
-                verbosity: Verbosity::NONE,
-                errors: Some(ErrorForm::Text),
+            incoming: Incoming {
+                id: None,
+                op: Ok(Op::SetLevel {
+                    verbosity: Verbosity::NONE,
+                    errors: Some(ErrorForm::Text),
+                }),
             },
             permit: None,
         };
         let _ = self.registry.send(quiet).await;
         Some(Opened {
             place: Ok(place),
-            transport: Transport::WebSocket(Box::new(WebSocket::new(stream))),
+            transport: Transport::socket(stream),
             first: behind.into(),
         })
     }

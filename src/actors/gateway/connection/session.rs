@@ -17,18 +17,19 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 use super::admission::{
     Admission, AuthError, HeldSlot, WRONG_TOKEN_TIME, authenticate, first_op, is_command,
 };
+use super::flow::Ends;
 use super::transport::Transport;
 use crate::actors::ConnectionId;
-use crate::actors::gateway::ends::Ends;
 use crate::actors::gateway::limits::{
     FRAME_TIME, HEAD_TIME, LINGER, LOOK_AGAIN, OPENING_TIME, READ_BYTES,
 };
-use crate::actors::gateway::messages::{Connect, CountRefusal, Disconnect, Outlets, Refused};
-use crate::actors::gateway::registry::Registry;
+use crate::actors::gateway::registry::{
+    Connect, CountRefusal, Disconnect, Outlets, Refused, Registry,
+};
 use crate::protocol::messages::{self, Level};
 #[cfg(feature = "web")]
 use crate::protocol::wire::frame::Foreign;
-use crate::protocol::wire::frame::{FrameReader, Opening, opening};
+use crate::protocol::wire::frame::{Opening, opening};
 #[cfg(feature = "web")]
 use crate::web::response::refusal;
 
@@ -140,7 +141,7 @@ impl ClientSession {
         };
         Some(Opened {
             place,
-            transport: Transport::Plain(stream, FrameReader::new()),
+            transport: Transport::plain(stream),
             first,
         })
     }
