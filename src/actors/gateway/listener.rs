@@ -34,6 +34,7 @@ pub const KEEPALIVE_PROBES: u32 = 4;
 // ---- state ----------------------------------------------------------------------------------------------------------
 
 /// The actor that owns one listening socket.
+#[derive(Clone)]
 pub struct Listener {
     socket: Arc<TcpListener>,
     registry: Addr<Registry>,
@@ -78,13 +79,7 @@ impl Actor for Listener {
     type Context = Context<Self>;
 
     fn started(&mut self, ctx: &mut Context<Self>) {
-        let accepting = accept(
-            Arc::clone(&self.socket),
-            self.registry.clone(),
-            Arc::clone(&self.gauges),
-            Arc::clone(&self.admission),
-        );
-        ctx.spawn(accepting.into_actor(self));
+        ctx.spawn(self.clone().accept().into_actor(self));
     }
 }
 
@@ -100,34 +95,31 @@ impl Handler<StopListening> for Listener {
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-async fn accept(
-    socket: Arc<TcpListener>,
-    registry: Addr<Registry>,
-    gauges: Arc<Gauges>,
-    admission: Arc<Admission>,
-) {
-    // An error is logged once, not twenty times a second.
-    let mut failing = false;
-    loop {
-        match socket.accept().await {
-            Ok((stream, peer)) => {
-                if std::mem::take(&mut failing) {
-                    tracing::info!("clients are accepted again");
+impl Listener {
+    async fn accept(self) {
+        // An error is logged once, not twenty times a second.
+        let mut failing = false;
+        loop {
+            match self.socket.accept().await {
+                Ok((stream, peer)) => {
+                    if std::mem::take(&mut failing) {
+                        tracing::info!("clients are accepted again");
+                    }
+                    if let Err(error) = prepare(&stream) {
+                        tracing::debug!(%peer, %error, "a socket option was refused");
+                    }
+                    tracing::debug!(%peer, "client connected");
+                    let local = stream.local_addr().unwrap_or(Ends::default().local);
+                    let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
+                    let (admission, ends) = (Arc::clone(&self.admission), Ends { local, peer });
+                    Connection::start_with(admission, ends, stream, registry, gauges);
                 }
-                if let Err(error) = prepare(&stream) {
-                    tracing::debug!(%peer, %error, "a socket option was refused");
+                Err(error) => {
+                    if !std::mem::replace(&mut failing, true) {
+                        tracing::warn!(%error, "cannot accept a client; retrying");
+                    }
+                    actix_rt::time::sleep(BACKOFF).await;
                 }
-                tracing::debug!(%peer, "client connected");
-                let local = stream.local_addr().unwrap_or(Ends::default().local);
-                let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
-                let ends = Ends { local, peer };
-                Connection::start_with(Arc::clone(&admission), ends, stream, registry, gauges);
-            }
-            Err(error) => {
-                if !std::mem::replace(&mut failing, true) {
-                    tracing::warn!(%error, "cannot accept a client; retrying");
-                }
-                actix_rt::time::sleep(BACKOFF).await;
             }
         }
     }

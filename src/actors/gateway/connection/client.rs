@@ -33,16 +33,27 @@ use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::SHORT;
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, Level};
-use crate::protocol::outbox::{MAX_AGE, Outbox, Throttle};
+use crate::protocol::outbox::{MAX_AGE, Outbox};
 
-// ---- the client -----------------------------------------------------------------------------------------------------
+// ---- state ----------------------------------------------------------------------------------------------------------
 
 /// The state of one client that the actor's handlers, its reader and its writer share.
 pub(super) struct ClientState<S> {
     /// The stream, after the session has ended.
     pub(super) transport: Option<Transport<S>>,
-    pub(super) outgoing: Outgoing,
     registry: Addr<Registry>,
+    gauges: Arc<Gauges>,
+    outbox: Outbox,
+    flow: FlowControl,
+    /// Whether each write has only one frame. Old clients, which end their frames without a newline, treat the bytes of
+    /// one read as one frame.
+    pub(super) is_single: bool,
+    /// Bytes of short responses in the outbox. The registry reads it.
+    pub(super) backlog: Arc<AtomicUsize>,
+    /// Time when the frames being written left the outbox, or when the client last took bytes of them.
+    pub(super) progress: Instant,
+    /// Start of the time in which responses have waited without a break.
+    responses_since: Option<Instant>,
     /// Heavy calls that wait for the running one, each with the length of its frame.
     computations: VecDeque<(Request, usize)>,
     /// Whether a heavy call runs.
@@ -58,10 +69,17 @@ pub(super) struct ClientState<S> {
 impl<S> ClientState<S> {
     /// The state of a client whose session has not ended.
     pub(super) fn new(gauges: Arc<Gauges>, unread: UnreadSource, registry: Addr<Registry>) -> Self {
+        let now = Instant::now();
         Self {
             transport: None,
-            outgoing: Outgoing::new(gauges, unread),
             registry,
+            gauges,
+            outbox: Outbox::new(),
+            flow: FlowControl::new(unread, now),
+            is_single: false,
+            backlog: Arc::default(),
+            progress: now,
+            responses_since: None,
             computations: VecDeque::new(),
             is_running: false,
             is_finishing: false,
@@ -70,34 +88,136 @@ impl<S> ClientState<S> {
         }
     }
 
+    /// The transport of a client that is served.
+    pub(super) fn transport(&mut self) -> Result<&mut Transport<S>, ClientLost> {
+        self.transport.as_mut().ok_or(ClientLost::Gone)
+    }
+
+    // ---- into the outbox --------------------------------------------------------------------------------------------
+
     /// Puts a message of the registry into the outbox.
-    pub(super) fn take(&mut self, message: ToClient) {
-        let outgoing = &mut self.outgoing;
+    pub(super) fn accept(&mut self, message: ToClient) {
         match message {
-            ToClient::Deliver { topic, frame } => outgoing.accept(topic.as_ref(), frame),
+            ToClient::Deliver { topic, frame } => {
+                let now = Instant::now().into_std();
+                self.counting_dropped(|outbox| match &topic {
+                    Some(topic) => outbox.push(topic, frame, now),
+                    None => outbox.push_feedback(frame, now),
+                });
+            }
             ToClient::Respond { frame, service } => {
-                outgoing.push_response(frame, service.map_or(&[], Service::supersedes));
+                self.push_response(frame, service.map_or(&[], Service::supersedes));
                 if service.is_some_and(Service::is_computation) {
                     self.is_running = false;
                     self.start_computation();
                 }
             }
-            ToClient::Configure { topic, throttle } => outgoing.configure(&topic, throttle),
+            ToClient::Configure { topic, throttle } => self.outbox.configure(&topic, throttle),
             ToClient::Finish => self.is_finishing = true,
         }
     }
 
-    /// The transport of a client that is served.
-    pub(super) fn transport(&mut self) -> Result<&mut Transport<S>, ClientLost> {
-        self.transport.as_mut().ok_or(ClientLost::Gone)
+    fn counting_dropped(&mut self, act: impl FnOnce(&mut Outbox)) {
+        let before = self.outbox.dropped();
+        act(&mut self.outbox);
+        let dropped = self.outbox.dropped() - before;
+        if dropped > 0 {
+            self.gauges.add_dropped(dropped);
+        }
+    }
+
+    /// Adds a response or a status. Discards held-back messages on `superseded` topics, because they are older.
+    fn push_response(&mut self, frame: Bytes, superseded: &[&'static str]) {
+        self.responses_since.get_or_insert_with(Instant::now);
+        self.outbox.push_response(frame, superseded);
+        self.note_backlog();
     }
 
     /// Refuses the client: it gets a status with the reason, and its further input is discarded.
     pub(super) fn refuse(&mut self, why: &str) {
         self.is_refused = true;
         let status = messages::status(Level::Error, why, None);
-        self.outgoing.push_response(status, &[]);
+        self.push_response(status, &[]);
     }
+
+    // ---- out of the outbox ------------------------------------------------------------------------------------------
+
+    /// Takes the next frames out of the outbox, if all previous ones were written. Returns whether there are frames to
+    /// write. Nothing is held back from a client whose connection is finishing.
+    fn take_frames(&mut self) -> bool {
+        if self.outbox.writing().len() > 0 {
+            return true;
+        }
+        let (has_topics, holds_back) = (self.outbox.has_topics(), self.outbox.holds_back());
+        if self.outbox.is_empty() && !holds_back {
+            return false;
+        }
+        let now = Instant::now();
+        let room = if self.is_finishing {
+            usize::MAX
+        } else if has_topics || holds_back {
+            self.flow.room(now)
+        } else {
+            0
+        };
+        let most = if self.is_single { 1 } else { WRITE_FRAMES };
+        let is_far_behind = !self.is_finishing && self.flow.is_far_behind();
+        let fresh = if is_far_behind { FRESH } else { MAX_AGE };
+        self.counting_dropped(|outbox| {
+            outbox.allow(room, fresh);
+            outbox.take_frames(now.into_std(), most, WRITE_BYTES);
+        });
+        self.progress = now;
+        self.outbox.writing().len() > 0
+    }
+
+    /// Notes that `bytes` of the frames were written. Returns whether that allows the client to be read again.
+    fn note_written(&mut self, bytes: usize) -> bool {
+        let may_read = self.may_read();
+        self.progress = Instant::now();
+        self.flow.note_written(bytes, self.progress);
+        self.outbox.written(bytes);
+        if self.responses_since.is_some() {
+            self.note_backlog();
+        }
+        if self.outbox.response_bytes() == 0 {
+            self.responses_since = None;
+        }
+        self.start_computation();
+        !may_read && self.may_read()
+    }
+
+    fn note_backlog(&self) {
+        let waiting = self.outbox.short_bytes();
+        self.backlog.store(waiting, Ordering::Relaxed);
+    }
+
+    /// The earliest time of the next write, if nothing can be written now. Either a message is throttled, or the client
+    /// must read first.
+    fn next_release(&self) -> Option<Instant> {
+        let release = self.outbox.next_release().map(Instant::from_std);
+        let waits = self.outbox.has_topics() && !self.outbox.has_responses();
+        let look = self.flow.next_look().filter(|_| waits);
+        release.into_iter().chain(look).min()
+    }
+
+    /// Whether the client has read nothing for too long while a long message waits.
+    fn is_stuck(&self) -> bool {
+        self.flow.age() > STALL_LIMIT && self.outbox.has_long()
+    }
+
+    /// The deadline of a client that takes no byte of a write. `None` if no response or long message waits, unless it
+    /// is finishing. `taken` is the time when it last took a byte of the current write.
+    fn patience(&self, taken: Option<Instant>) -> Option<Instant> {
+        let last_byte = taken.map_or(self.progress, |taken| taken.max(self.progress));
+        match self.responses_since {
+            Some(since) => Some(since.max(last_byte) + STALL_LIMIT),
+            None if self.is_finishing => Some(last_byte + LINGER),
+            None => self.outbox.has_long().then(|| last_byte + STALL_LIMIT),
+        }
+    }
+
+    // ---- computations: one runs, and others wait --------------------------------------------------------------------
 
     /// Whether the reader may go on: neither too many responses nor too many computations wait, or it is to end.
     pub(super) fn may_read(&self) -> bool {
@@ -109,15 +229,7 @@ impl<S> ClientState<S> {
 
     /// Whether another computation may start: not too many responses wait.
     const fn may_compute(&self) -> bool {
-        self.outgoing.response_bytes() <= MAX_RESPONSES_WAITING
-    }
-
-    /// Notes that `bytes` were written. Returns whether that allows the client to be read again.
-    fn note_written(&mut self, bytes: usize) -> bool {
-        let may_read = self.may_read();
-        self.outgoing.written(bytes);
-        self.start_computation();
-        !may_read && self.may_read()
+        self.outbox.response_bytes() <= MAX_RESPONSES_WAITING
     }
 
     /// Queues a heavy call, whose frame had `length` bytes.
@@ -146,174 +258,6 @@ impl<S> ClientState<S> {
     pub(super) fn abandon_computations(&mut self) {
         self.computations.clear();
         self.is_running = false;
-    }
-}
-
-// ---- the outbox and the frames that are being written ---------------------------------------------------------------
-
-/// The outgoing side of one client.
-pub(super) struct Outgoing {
-    outbox: Outbox,
-    /// Whether each write has only one frame. Old clients, which end their frames without a newline, treat the bytes of
-    /// one read as one frame.
-    singly: bool,
-    flow: FlowControl,
-    gauges: Arc<Gauges>,
-    /// Bytes of short responses in the outbox. The registry reads it.
-    backlog: Arc<AtomicUsize>,
-    /// Time when the frames being written left the outbox, or when the client last took bytes of them.
-    progress: Instant,
-    /// Start of the time in which responses have waited without a break.
-    responses_since: Option<Instant>,
-}
-
-impl Outgoing {
-    /// An empty outgoing side.
-    fn new(gauges: Arc<Gauges>, unread: UnreadSource) -> Self {
-        let now = Instant::now();
-        Self {
-            outbox: Outbox::new(),
-            singly: false,
-            flow: FlowControl::new(unread, now),
-            gauges,
-            backlog: Arc::default(),
-            progress: now,
-            responses_since: None,
-        }
-    }
-
-    /// Bytes of short responses in the outbox, shared with the registry.
-    pub(super) fn backlog(&self) -> Arc<AtomicUsize> {
-        Arc::clone(&self.backlog)
-    }
-
-    // ---- putting in -------------------------------------------------------------------------------------------------
-
-    /// Adds a topic message, or a series of messages.
-    fn accept(&mut self, topic: Option<&Arc<str>>, frame: Bytes) {
-        let now = Instant::now().into_std();
-        self.counting_dropped(|outbox| match topic {
-            Some(topic) => outbox.push(topic, frame, now),
-            None => outbox.push_feedback(frame, now),
-        });
-    }
-
-    fn counting_dropped(&mut self, act: impl FnOnce(&mut Outbox)) {
-        let before = self.outbox.dropped();
-        act(&mut self.outbox);
-        let dropped = self.outbox.dropped() - before;
-        if dropped > 0 {
-            self.gauges.add_dropped(dropped);
-        }
-    }
-
-    /// Adds a response or a status. Discards held-back messages on `superseded` topics, because they are older.
-    fn push_response(&mut self, frame: Bytes, superseded: &[&'static str]) {
-        self.responses_since.get_or_insert_with(Instant::now);
-        self.outbox.push_response(frame, superseded);
-        self.note_backlog();
-    }
-
-    /// Sets the throttle of a topic, or removes the topic.
-    fn configure(&mut self, topic: &Arc<str>, throttle: Option<Throttle>) {
-        self.outbox.configure(topic, throttle);
-    }
-
-    /// Sets whether each write has only one frame.
-    pub(super) const fn set_singly(&mut self, singly: bool) {
-        self.singly = singly;
-    }
-
-    // ---- taking out -------------------------------------------------------------------------------------------------
-
-    /// The frames to write next.
-    fn frames(&self) -> impl ExactSizeIterator<Item = &Bytes> {
-        self.outbox.writing()
-    }
-
-    /// Takes the next frames out of the outbox, if all previous ones were written. Returns whether there are frames to
-    /// write. Nothing is held back from a client whose connection is finishing.
-    fn take(&mut self, is_finishing: bool) -> bool {
-        if self.frames().len() == 0 {
-            self.take_next(is_finishing);
-        }
-        self.frames().len() > 0
-    }
-
-    fn take_next(&mut self, is_finishing: bool) {
-        let (has_topics, holds_back) = (self.outbox.has_topics(), self.outbox.holds_back());
-        if self.outbox.is_empty() && !holds_back {
-            return;
-        }
-        let now = Instant::now();
-        let room = if is_finishing {
-            usize::MAX
-        } else if has_topics || holds_back {
-            self.flow.room(now)
-        } else {
-            0
-        };
-        let most = if self.singly { 1 } else { WRITE_FRAMES };
-        let is_far_behind = !is_finishing && self.flow.is_far_behind();
-        let fresh = if is_far_behind { FRESH } else { MAX_AGE };
-        self.counting_dropped(|outbox| {
-            outbox.allow(room, fresh);
-            outbox.take_frames(now.into_std(), most, WRITE_BYTES);
-        });
-        self.progress = now;
-    }
-
-    /// Notes that `bytes` of the frames were written.
-    fn written(&mut self, bytes: usize) {
-        self.progress = Instant::now();
-        self.flow.note_written(bytes, self.progress);
-        self.outbox.written(bytes);
-        if self.responses_since.is_some() {
-            self.note_backlog();
-        }
-        if self.outbox.response_bytes() == 0 {
-            self.responses_since = None;
-        }
-    }
-
-    fn note_backlog(&self) {
-        let waiting = self.outbox.short_bytes();
-        self.backlog.store(waiting, Ordering::Relaxed);
-    }
-
-    /// The earliest time of the next write, if nothing can be written now. Either a message is throttled, or the client
-    /// must read first.
-    fn next_release(&self) -> Option<Instant> {
-        let release = self.outbox.next_release().map(Instant::from_std);
-        let waits = self.outbox.has_topics() && !self.outbox.has_responses();
-        let look = self.flow.next_look().filter(|_| waits);
-        release.into_iter().chain(look).min()
-    }
-
-    /// Bytes of the unwritten responses.
-    const fn response_bytes(&self) -> usize {
-        self.outbox.response_bytes()
-    }
-
-    /// Time when the client last took bytes, or was offered the first ones.
-    pub(super) const fn progress(&self) -> Instant {
-        self.progress
-    }
-
-    /// Whether the client has read nothing for too long while a long message waits.
-    fn is_stuck(&self) -> bool {
-        self.flow.age() > STALL_LIMIT && self.outbox.has_long()
-    }
-
-    /// The deadline of a client that takes no byte of a write. `None` if no response or long message waits, unless it
-    /// is finishing. `taken` is the time when it last took a byte of the current write.
-    fn patience(&self, taken: Option<Instant>, is_finishing: bool) -> Option<Instant> {
-        let last_byte = taken.map_or(self.progress, |taken| taken.max(self.progress));
-        match self.responses_since {
-            Some(since) => Some(since.max(last_byte) + STALL_LIMIT),
-            None if is_finishing => Some(last_byte + LINGER),
-            None => self.outbox.has_long().then(|| last_byte + STALL_LIMIT),
-        }
     }
 }
 
@@ -380,13 +324,13 @@ impl ClientWriter {
     ) -> Poll<bool> {
         let mut written = 0;
         loop {
-            let is_finishing = client.is_finishing;
-            let is_done = is_finishing && !client.is_computing();
+            let is_done = client.is_finishing && !client.is_computing();
+            let has_frames = client.take_frames();
             let Some(transport) = &mut client.transport else {
                 return Poll::Ready(false);
             };
-            let (patience, release) = if client.outgoing.take(is_finishing) {
-                match transport.poll_write(cx, client.outgoing.frames()) {
+            let (patience, release) = if has_frames {
+                match transport.poll_write(cx, client.outbox.writing()) {
                     Poll::Ready(Ok(bytes)) => {
                         // After many bytes, other connections have a turn. The reader may continue.
                         let may_read = client.note_written(bytes);
@@ -404,16 +348,16 @@ impl ClientWriter {
                     Poll::Pending => {}
                 }
                 let taken = transport.last_taken();
-                (client.outgoing.patience(taken, is_finishing), None)
+                (client.patience(taken), None)
             } else if is_done {
                 return self.poll_end(client, cx);
             } else {
                 let is_gone = matches!(transport.poll_flush(cx), Poll::Ready(Err(_)));
-                if is_gone || client.outgoing.is_stuck() {
+                if is_gone || client.is_stuck() {
                     return Poll::Ready(false);
                 }
                 self.turns.rest();
-                (None, client.outgoing.next_release())
+                (None, client.next_release())
             };
             ready!(self.poll_timer(patience.or(release), cx));
             if patience.is_some() {

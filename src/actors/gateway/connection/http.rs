@@ -12,13 +12,13 @@ use tokio::time::Instant;
 use super::admission::HeldSlot;
 use super::session::{ClientSession, HeldPlace, Opened};
 use super::transport::Transport;
-use crate::actors::gateway::registry::{Outlets, Refused, Request};
+use crate::actors::gateway::registry::{Refused, Request};
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Incoming, Op, Verbosity};
 use crate::web::serve::{self, Gate};
 
-/// A client without a place: its outlets, its slot, and the reason. `None` means that the token is missing.
-pub(super) type Newcomer<'a> = (Outlets, HeldSlot<'a>, Option<Refused>);
+/// A client without a place: its slot, and the reason. `None` means that the token is missing.
+pub(super) type Newcomer<'a> = (HeldSlot<'a>, Option<Refused>);
 
 /// Admits or refuses the requests of one client.
 struct HttpGate<'a> {
@@ -30,10 +30,10 @@ struct HttpGate<'a> {
 
 impl Gate for HttpGate<'_> {
     async fn admit(&self) -> Result<(), String> {
-        let Some((outlets, slot, _)) = self.newcomer.take() else {
+        let Some((slot, _)) = self.newcomer.take() else {
             return Ok(());
         };
-        let place = self.session.wait_for_place(&outlets, &slot).await;
+        let place = self.session.wait_for_place(&slot).await;
         let place = place.map_err(|why| self.session.turn_away(Some(why)))?;
         self.place.set(Some(place));
         Ok(())
@@ -61,7 +61,7 @@ impl ClientSession {
             Ok(place) => (Some(place), None),
             Err(newcomer) => (None, Some(newcomer)),
         };
-        let evicted = newcomer.as_ref().map(|(_, slot, _)| slot.evicted());
+        let evicted = newcomer.as_ref().map(|(slot, _)| slot.evicted());
         let gate = HttpGate {
             session: self,
             newcomer: Cell::new(newcomer),
@@ -71,7 +71,7 @@ impl ClientSession {
         let crowded = async {
             if let Some(evicted) = evicted {
                 evicted.await;
-                if let Some((.., why)) = gate.newcomer.take() {
+                if let Some((_, why)) = gate.newcomer.take() {
                     return self.turn_away(why);
                 }
             }

@@ -112,15 +112,16 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
         let outlets = Outlets {
             mailbox: ctx.address().recipient(),
             gone: Arc::new(AtomicBool::new(false)),
-            backlog: self.client.borrow().outgoing.backlog(),
+            backlog: Arc::clone(&self.client.borrow().backlog),
         };
         let session = ClientSession {
             registry: self.registry.clone(),
             finish: Arc::clone(&self.finish),
             admission,
             ends: self.ends,
+            outlets,
         };
-        let opened = contained(session.run(stream, outlets)).into_actor(self);
+        let opened = contained(session.run(stream)).into_actor(self);
         ctx.spawn(opened.map(|opened, connection, ctx| match opened {
             Ok(Some(opened)) => connection.converse(opened, ctx),
             Ok(None) => ctx.stop(),
@@ -142,7 +143,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<ToClient> for Connecti
         if matches!(message, ToClient::Finish) {
             self.finish.notify_one();
         }
-        if let Err(panic) = contain(|| self.client.borrow_mut().take(message)) {
+        if let Err(panic) = contain(|| self.client.borrow_mut().accept(message)) {
             tracing::error!(%panic, "a client's actor failed; its connection ends");
             ctx.stop();
         }

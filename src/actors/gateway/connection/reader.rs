@@ -190,8 +190,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> ClientReader<S> {
             self.frame_due = None;
         }
         match &part {
-            Some(FramePart::Lines(_)) => client.outgoing.set_singly(false),
-            Some(FramePart::Frame(frame)) => client.outgoing.set_singly(!frame.newline()),
+            Some(FramePart::Lines(_)) => client.is_single = false,
+            Some(FramePart::Frame(frame)) => client.is_single = !frame.newline(),
             Some(FramePart::Error(..)) | None => {}
         }
         Ok(part)
@@ -247,7 +247,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> ClientReader<S> {
             let since = self
                 .has_ended
                 .then(|| *ended.get_or_insert_with(Instant::now));
-            let progress = self.client.borrow().outgoing.progress();
+            let progress = self.client.borrow().progress;
             let due = since.map(|since| since.max(progress) + RESPONSES_TIME);
             if due.is_some_and(|due| due <= Instant::now()) {
                 return Err(ClientLost::Gone);

@@ -25,24 +25,17 @@ pub(super) struct Forwarded {
     pub(super) provider: ConnectionId,
     /// The name of the service or action, as the caller spells it.
     pub(super) name: Box<str>,
-    pub(super) terms: RequestTerms,
+    pub(super) kind: Served,
+    /// A call ends at its deadline. The registry may notice that later if the process was suspended. A goal has none.
+    pub(super) deadline: Option<Instant>,
+    /// The server's spelling of a goal's action. The goal can be cancelled under it.
+    pub(super) spelling: Option<Box<str>>,
+    /// Whether the sender of a goal gets feedback.
+    pub(super) wants_feedback: bool,
+    /// A caller that has stopped sending is removed when its last call has ended.
+    pub(super) _done: Option<Done>,
     /// Its part of the caller's limit [`MAX_KEPT`](crate::actors::gateway::limits::MAX_KEPT).
     pub(super) _entry: KeptEntry,
-}
-
-/// The differences between calls and goals.
-pub(super) enum RequestTerms {
-    /// A call ends at its deadline. The registry may notice that later if the process was suspended.
-    Call {
-        deadline: Instant,
-        /// A client that has stopped sending is removed when its last call has ended.
-        _done: Option<Done>,
-    },
-    /// A goal has no deadline. It can be cancelled under its name at the server.
-    Goal {
-        spelling: Box<str>,
-        wants_feedback: bool,
-    },
 }
 
 /// A key of the index. Deadlines sort first, so the first entry is the next deadline.
@@ -54,26 +47,12 @@ enum RequestKey {
 }
 
 impl Forwarded {
-    const fn kind(&self) -> Served {
-        match self.terms {
-            RequestTerms::Call { .. } => Served::Service,
-            RequestTerms::Goal { .. } => Served::Action,
-        }
-    }
-
-    fn deadline(&self) -> Option<Instant> {
-        match self.terms {
-            RequestTerms::Call { deadline, .. } => Some(deadline),
-            RequestTerms::Goal { .. } => None,
-        }
-    }
-
     fn keys(&self) -> impl Iterator<Item = RequestKey> + use<> {
         let clients = [
-            RequestKey::Caller(self.caller, self.kind()),
-            RequestKey::Provider(self.provider, self.kind()),
+            RequestKey::Caller(self.caller, self.kind),
+            RequestKey::Provider(self.provider, self.kind),
         ];
-        let deadline = self.deadline().map(RequestKey::Deadline);
+        let deadline = self.deadline.map(RequestKey::Deadline);
         clients.into_iter().chain(deadline)
     }
 }
@@ -144,10 +123,10 @@ impl Requests {
         };
         let request = self.outstanding.get(&number)?;
         let is_late = request
-            .deadline()
+            .deadline
             .is_some_and(|deadline| Instant::now() > deadline);
         let is_meant = id.is_some() || name.is_none_or(|name| names::are_same(&request.name, name));
-        let is_theirs = request.provider == provider && request.kind() == kind;
+        let is_theirs = request.provider == provider && request.kind == kind;
         (is_theirs && is_meant && !is_late).then_some(number)
     }
 

@@ -219,14 +219,13 @@ impl Subscriber {
         connection: ConnectionId,
         spelling: Arc<str>,
         mailbox: Recipient<ToClient>,
-        first: Subscription,
     ) -> Self {
         Self {
             connection,
             spelling,
             mailbox,
-            encoding: first.encoding,
-            subscriptions: vec![first],
+            encoding: Encoding::default(),
+            subscriptions: Vec::new(),
         }
     }
 

@@ -9,7 +9,7 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::{Instant, sleep_until};
 
-use super::forwarded::{Forwarded, RequestTerms};
+use super::forwarded::Forwarded;
 use super::refusal::Refusal;
 use super::{FrameOrigin, Handled, RefuseCalls, Registry, Tapped};
 use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
@@ -78,15 +78,16 @@ impl Registry {
             }
         } else {
             let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
-            let done = client.calls.as_ref().map(|(done, _)| Done::clone(done));
-            let terms = |_: &str| RequestTerms::Call {
-                deadline,
-                _done: done,
-            };
             let args = call.args.payload();
             let encode = |spelling: &str, id: &str| messages::call(spelling, id, args);
             let name = (&*call.service, &call.args);
-            self.forward(&origin, Served::Service, name, terms, encode)
+            self.forward(
+                &origin,
+                Served::Service,
+                name,
+                (Some(deadline), false),
+                encode,
+            )
         };
         self.schedule_cleanup(ctx);
         if let Err(why) = refusal {
@@ -127,16 +128,12 @@ impl Registry {
                 Err(why) => Err(why),
             }
         } else {
-            let terms = |spelling: &str| RequestTerms::Goal {
-                spelling: spelling.into(),
-                wants_feedback: goal.feedback,
-            };
             let (type_name, args) = (goal.type_name.as_deref(), goal.args.payload());
             let encode = |spelling: &str, id: &str| {
                 messages::action_goal(spelling, id, type_name, args, goal.feedback)
             };
             let name = (&*goal.action, &goal.args);
-            self.forward(&origin, Served::Action, name, terms, encode)
+            self.forward(&origin, Served::Action, name, (None, goal.feedback), encode)
         };
         if let Err(why) = refusal {
             self.end_goal(&origin, &goal.action, &why, GoalStatus::Unknown);
@@ -278,7 +275,7 @@ impl Registry {
         origin: &FrameOrigin,
         kind: Served,
         (name, args): (&str, &Arguments),
-        terms: impl FnOnce(&str) -> RequestTerms,
+        (deadline, wants_feedback): (Option<Instant>, bool),
         encode: impl FnOnce(&str, &str) -> Bytes,
     ) -> Result<(), Refusal> {
         let absolute = &*names::absolute(name);
@@ -298,20 +295,26 @@ impl Registry {
         let Some(caller) = self.clients.get(&origin.from) else {
             return Ok(());
         };
-        let terms = terms(&provider.spelling);
-        let spelling = match &terms {
-            RequestTerms::Call { .. } => 0,
-            RequestTerms::Goal { spelling, .. } => spelling.len(),
+        let (spelling, done) = match kind {
+            Served::Service => (
+                None,
+                caller.calls.as_ref().map(|(done, _)| Done::clone(done)),
+            ),
+            Served::Action => (Some(provider.spelling.clone()), None),
         };
         let id = origin.id.as_ref().map_or(0, Payload::allocated);
-        let entry = caller.kept.enter(id + name.len() + spelling, None)?;
+        let bytes = id + name.len() + spelling.as_deref().map_or(0, str::len);
         let known_as = self.requests.add(Forwarded {
             caller: origin.from,
             id: origin.id.clone(),
             provider: provider.connection,
             name: name.into(),
-            terms,
-            _entry: entry,
+            kind,
+            deadline,
+            spelling,
+            wants_feedback,
+            _done: done,
+            _entry: caller.kept.enter(bytes, None)?,
         });
         if let Some(client) = self.clients.get(&provider.connection) {
             client.send(self.covered(encode(&provider.spelling, &known_as)));
@@ -330,9 +333,7 @@ impl Registry {
                 None => Refusal::NoAction(action.to_owned()),
             });
         };
-        if let (Some(server), RequestTerms::Goal { spelling, .. }) =
-            (self.clients.get(&goal.provider), &goal.terms)
-        {
+        if let (Some(server), Some(spelling)) = (self.clients.get(&goal.provider), &goal.spelling) {
             if server.backlog() > MAX_BACKLOG {
                 return Err(Refusal::ProviderBusy(action.to_owned()));
             }
@@ -355,9 +356,8 @@ impl Registry {
         if !names::are_same(&goal.name, action) {
             return Err(Refusal::OfAnother(Served::Action, goal.name.to_string()));
         }
-        let is_wanted =
-            matches!(goal.terms, RequestTerms::Goal { wants_feedback, .. } if wants_feedback);
-        if let Some(sender) = self.clients.get(&goal.caller).filter(|_| is_wanted) {
+        let sender = self.clients.get(&goal.caller);
+        if let Some(sender) = sender.filter(|_| goal.wants_feedback) {
             let frame = messages::action_feedback(&goal.name, goal.id.as_ref(), values);
             sender.deliver_feedback(cover_message(self.permit.as_ref(), frame));
         }
@@ -430,9 +430,9 @@ impl Registry {
             from: request.caller,
             id: request.id.clone(),
         };
-        match request.terms {
-            RequestTerms::Call { .. } => self.refuse_call(&origin, &request.name, why, None),
-            RequestTerms::Goal { .. } => {
+        match request.kind {
+            Served::Service => self.refuse_call(&origin, &request.name, why, None),
+            Served::Action => {
                 self.end_goal(&origin, &request.name, why, GoalStatus::Aborted);
             }
         }

@@ -103,19 +103,18 @@ impl Registry {
             encoding: encoding_for(subscribe),
             entry,
         };
-        if let Some(known) = known {
-            known.change(|one| one.id != id, Some(subscription));
-        } else {
+        if known.is_none() {
             let spelling: Arc<str> = topic.into();
             client.registered.subscribed.insert(Arc::clone(&spelling));
             let mailbox = client.outlets.mailbox.clone();
-            let new = Subscriber::new(origin.from, spelling, mailbox, subscription);
+            let new = Subscriber::new(origin.from, spelling, mailbox);
             self.topics.add_subscriber(&absolute, new);
         }
         if let Some(type_name) = subscribe.type_name.as_deref() {
             self.topics.note_type(&absolute, type_name);
         }
         if let Some(subscriber) = self.topics.subscriber(&absolute, topic, origin.from) {
+            subscriber.change(|one| one.id != id, Some(subscription));
             if is_new && Topic::from_name(topic).is_some_and(Topic::is_latched) {
                 // The throttle of an earlier subscription must not delay this one's latched message.
                 subscriber.configure(Some(Throttle::NONE));
@@ -316,7 +315,8 @@ impl Registry {
     fn fan_out(&self, topic: &str, encode: impl Fn(&str) -> Bytes) -> Delivered {
         let subscribers = self.topics.subscribers(topic);
         let mut plain: Vec<(&str, Bytes)> = Vec::new();
-        let mut others: Vec<(&str, Bytes, Encoding)> = Vec::new();
+        let mut others: Vec<(&str, Encoding)> = Vec::new();
+        let mut long = Vec::new();
         for subscriber in subscribers {
             let (spelling, encoding) = (&*subscriber.spelling, subscriber.encoding);
             let known = plain.iter().find(|(known, _)| *known == spelling);
@@ -328,20 +328,16 @@ impl Registry {
                     frame
                 }
             };
-            let is_asked = |one: &(&str, Bytes, Encoding)| one.0 == spelling && one.2 == encoding;
             if is_sent_plain(encoding, frame.len()) {
                 deliver(subscriber, frame);
-            } else if !others.iter().any(is_asked) {
-                others.push((spelling, frame, encoding));
-            }
-        }
-        let mut long = Vec::new();
-        for (spelling, frame, encoding) in others {
-            let message = self.to_encode(spelling, frame, encoding);
-            if message.is_long() {
-                long.push(message);
-            } else {
-                self.deliver_made(&message, &message.make());
+            } else if !others.contains(&(spelling, encoding)) {
+                others.push((spelling, encoding));
+                let message = self.to_encode(spelling, frame, encoding);
+                if message.is_long() {
+                    long.push(message);
+                } else {
+                    self.deliver_made(&message, &message.make());
+                }
             }
         }
         let count = subscribers.len();
@@ -464,25 +460,17 @@ impl Handler<SetTap> for Registry {
     type Result = ();
 
     fn handle(&mut self, SetTap(tap): SetTap, _: &mut Context<Self>) {
-        let unwanted: Vec<&str> = Topic::ALL
-            .map(Topic::name)
-            .into_iter()
-            .filter(|topic| self.topics.subscribers(topic).is_empty())
-            .collect();
         let was_set = self.tap.is_some();
         self.tap = tap;
-        for topic in unwanted {
-            match (was_set, self.tap.is_some()) {
-                (_, true) => self.tell_owner(topic, true),
-                (true, false) => self.note_unwanted(topic),
-                (false, false) => {}
-            }
-        }
-        for (topic, frame) in &self.latched {
-            if let Some(tap) = &mut self.tap
-                && !self.topics.subscribers(topic.name()).is_empty()
-            {
-                tap(Tapped::Published(*topic, frame));
+        for topic in Topic::ALL {
+            if self.topics.subscribers(topic.name()).is_empty() {
+                match (was_set, self.tap.is_some()) {
+                    (_, true) => self.tell_owner(topic.name(), true),
+                    (true, false) => self.note_unwanted(topic.name()),
+                    (false, false) => {}
+                }
+            } else if let (Some(frame), Some(tap)) = (self.latched.get(&topic), &mut self.tap) {
+                tap(Tapped::Published(topic, frame));
             }
         }
     }
