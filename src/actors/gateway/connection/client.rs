@@ -22,7 +22,7 @@ use bytes::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::{Instant, Sleep, sleep_until};
 
-use super::flow::{FRESH, FlowControl, UnreadSource};
+use super::flow::{Ends, FRESH, FlowControl, UnreadSource};
 use super::transport::{ClientLost, Transport};
 use super::turns::Turns;
 use crate::actors::gateway::limits::{
@@ -41,8 +41,9 @@ use crate::protocol::outbox::{MAX_AGE, Outbox};
 pub(super) struct ClientState<S> {
     /// The stream, after the session has ended.
     pub(super) transport: Option<Transport<S>>,
-    registry: Addr<Registry>,
-    gauges: Arc<Gauges>,
+    pub(super) ends: Ends,
+    pub(super) registry: Addr<Registry>,
+    pub(super) gauges: Arc<Gauges>,
     outbox: Outbox,
     flow: FlowControl,
     /// Whether each write has only one frame. Old clients, which end their frames without a newline, treat the bytes of
@@ -68,10 +69,16 @@ pub(super) struct ClientState<S> {
 
 impl<S> ClientState<S> {
     /// The state of a client whose session has not ended.
-    pub(super) fn new(gauges: Arc<Gauges>, unread: UnreadSource, registry: Addr<Registry>) -> Self {
+    pub(super) fn new(
+        ends: Ends,
+        unread: UnreadSource,
+        registry: Addr<Registry>,
+        gauges: Arc<Gauges>,
+    ) -> Self {
         let now = Instant::now();
         Self {
             transport: None,
+            ends,
             registry,
             gauges,
             outbox: Outbox::new(),

@@ -40,7 +40,6 @@ use self::session::{ClientSession, Opened};
 use super::registry::{Outlets, Registry, ToClient};
 use crate::actors::panics::{contain, contained};
 use crate::actors::resources::gauges::Gauges;
-use crate::actors::resources::memory::Memory;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -48,10 +47,6 @@ use crate::actors::resources::memory::Memory;
 pub struct Connection<S> {
     /// The stream and the conditions of admission, until the session takes them.
     newcomer: Option<(S, Arc<Admission>)>,
-    ends: Ends,
-    registry: Addr<Registry>,
-    /// The shared memory for long frames.
-    memory: Memory,
     client: Rc<RefCell<ClientState<S>>>,
     /// Notifies the session that the runtime is ending.
     finish: Arc<Notify>,
@@ -85,13 +80,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         registry: Addr<Registry>,
         gauges: Arc<Gauges>,
     ) -> Addr<Self> {
-        let memory = gauges.memory().clone();
-        let client = ClientState::new(gauges, unread, registry.clone());
+        let client = ClientState::new(ends, unread, registry, gauges);
         Self {
             newcomer: Some((stream, admission)),
-            ends,
-            registry,
-            memory,
             client: Rc::new(RefCell::new(client)),
             finish: Arc::default(),
         }
@@ -109,16 +100,17 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
         let Some((stream, admission)) = self.newcomer.take() else {
             return;
         };
+        let client = self.client.borrow();
         let outlets = Outlets {
             mailbox: ctx.address().recipient(),
             gone: Arc::new(AtomicBool::new(false)),
-            backlog: Arc::clone(&self.client.borrow().backlog),
+            backlog: Arc::clone(&client.backlog),
         };
         let session = ClientSession {
-            registry: self.registry.clone(),
+            registry: client.registry.clone(),
             finish: Arc::clone(&self.finish),
             admission,
-            ends: self.ends,
+            ends: client.ends,
             outlets,
         };
         let opened = contained(session.run(stream)).into_actor(self);
@@ -156,14 +148,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
     /// Reads and writes until the client disconnects, or has received all its messages.
     fn converse(&self, opened: Opened<S>, ctx: &mut Context<Self>) {
         let client = Rc::clone(&self.client);
-        let first = (opened.transport.is_socket(), opened.first);
         client.borrow_mut().transport = Some(opened.transport);
         let reading: Pin<Box<dyn Future<Output = ()>>> = match opened.place {
-            Ok(place) => {
-                let (registry, memory) = (self.registry.clone(), self.memory.clone());
-                let (ends, client) = (self.ends, Rc::clone(&client));
-                Box::pin(ClientReader::new(client, registry, memory, (ends, place), first).run())
-            }
+            Ok(place) => Box::pin(ClientReader::new(&client, place, opened.first).run()),
             Err(why) => {
                 client.borrow_mut().refuse(&why);
                 client.borrow_mut().is_finishing = true;

@@ -17,7 +17,7 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 use super::client::ClientState;
 use super::flow::{Ends, has_closed};
 use super::session::HeldPlace;
-use super::transport::ClientLost;
+use super::transport::{ClientLost, Transport};
 use super::turns::Turns;
 use crate::actors::gateway::limits::{
     CLOSED_CHECK, DISCARD_BYTES, DISCARD_TIME, FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, READ_BYTES,
@@ -81,19 +81,18 @@ struct Spent {
 impl<S: AsyncRead + AsyncWrite + Unpin> ClientReader<S> {
     /// A reader of a client with a place, whose bytes `first` have been read.
     pub(super) fn new(
-        client: Rc<RefCell<ClientState<S>>>,
-        registry: Addr<Registry>,
-        memory: Memory,
-        (ends, place): (Ends, HeldPlace),
-        (takes_binary, first): (bool, BytesMut),
+        client: &Rc<RefCell<ClientState<S>>>,
+        place: HeldPlace,
+        first: BytesMut,
     ) -> Self {
+        let state = client.borrow();
         Self {
-            client,
-            registry,
+            client: Rc::clone(client),
+            registry: state.registry.clone(),
             place,
-            ends,
-            memory,
-            takes_binary,
+            ends: state.ends,
+            memory: state.gauges.memory().clone(),
+            takes_binary: state.transport.as_ref().is_some_and(Transport::is_socket),
             chunk: first,
             has_ended: false,
             frame_due: None,
