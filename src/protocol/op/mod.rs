@@ -213,6 +213,19 @@ pub struct ActionGoal {
     pub feedback: bool,
 }
 
+/// The final status of a goal, as in `action_msgs/msg/GoalStatus`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GoalStatus {
+    /// Never accepted.
+    Unknown = 0,
+    /// Reached.
+    Succeeded = 4,
+    /// Cancelled by a client.
+    Canceled = 5,
+    /// Replaced by another goal or ended by a reset.
+    Aborted = 6,
+}
+
 /// The kinds of names that a client can serve to others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Served {
@@ -266,19 +279,6 @@ pub enum ProviderOp {
         /// Whether the goal has a result.
         result: bool,
     },
-}
-
-/// The final status of a goal, as in `action_msgs/msg/GoalStatus`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum GoalStatus {
-    /// Never accepted.
-    Unknown = 0,
-    /// Reached.
-    Succeeded = 4,
-    /// Cancelled by a client.
-    Canceled = 5,
-    /// Replaced by another goal or ended by a reset.
-    Aborted = 6,
 }
 
 /// The arguments of a call.
