@@ -22,9 +22,7 @@ use crate::actors::compute::workers::WorkerPool;
 use crate::actors::gateway::connection::admission::{Admission, Slots};
 use crate::actors::gateway::files;
 use crate::actors::gateway::listener::{self, Listener, StopListening};
-use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
-use crate::actors::gateway::registry::{Attach, Registry};
-use crate::actors::gateway::unbound;
+use crate::actors::gateway::registry::{Attach, FinishAll, RefuseCalls, Registry};
 use crate::actors::node::ShutDown;
 use crate::actors::nodes;
 use crate::actors::panics::contain;
@@ -61,7 +59,7 @@ const RECORD_TIME: Duration = Duration::from_millis(250);
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The runtime cannot listen on the address.
-    #[error("cannot listen on {address}: {}", unbound::remedy(source))]
+    #[error("cannot listen on {address}: {}", listener::remedy(source))]
     Bind {
         /// The address.
         address: SocketAddr,
@@ -264,7 +262,7 @@ fn bind(options: &Options) -> Result<Vec<TcpListener>, RunError> {
         let twin = SocketAddr::new(IpAddr::V6(Ipv6Addr::LOCALHOST), address.port());
         match listener::bind(twin) {
             Ok(socket) => sockets.push(socket),
-            Err(error) => unbound::report_twin(twin, &error),
+            Err(error) => listener::report_twin(twin, &error),
         }
     }
     Ok(sockets)

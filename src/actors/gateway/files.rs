@@ -28,24 +28,20 @@ pub struct Room {
 pub fn make_room(wanted_clients: usize, asks_token: bool) -> Room {
     let wanted = wanted_clients + MAX_NEWCOMERS + OTHER_FILES + REFUSED_AT_ONCE;
     // The limit is never lowered.
-    match raise_limit(wanted) {
-        Ok(files) => {
-            let room = room_with(files, wanted_clients, asks_token);
-            let clients = room.clients;
-            if clients < wanted_clients {
-                tracing::warn!(
-                    files,
-                    clients,
-                    "the limit of open files is low, so fewer clients are served"
-                );
-            }
-            room
-        }
-        Err(error) => {
-            tracing::warn!(%error, "the limit of open files is unknown");
-            room_with(usize::MAX, wanted_clients, asks_token)
-        }
+    let files = raise_limit(wanted).unwrap_or_else(|error| {
+        tracing::warn!(%error, "the limit of open files is unknown");
+        usize::MAX
+    });
+    let room = room_with(files, wanted_clients, asks_token);
+    let clients = room.clients;
+    if clients < wanted_clients {
+        tracing::warn!(
+            files,
+            clients,
+            "the limit of open files is low, so fewer clients are served"
+        );
     }
+    room
 }
 
 /// Raises the limit to `wanted` or the largest allowed value. Returns the new limit.

@@ -1,8 +1,9 @@
-//! Accepts clients and gives each its connection actor.
+//! Listens, or says why that is impossible. Accepts clients and gives each its connection actor.
 //!
 //! **Invariant:** an error of `accept`, such as too many open files or a client that has disconnected, never ends the
 //! accept loop. The loop never spins.
 
+use std::io::{Error, ErrorKind};
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,9 +12,8 @@ use actix::prelude::*;
 use socket2::{SockRef, TcpKeepalive};
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 
-use super::connection::Connection;
 use super::connection::admission::Admission;
-use super::ends::Ends;
+use super::connection::{Connection, Ends};
 use super::registry::Registry;
 use crate::actors::resources::gauges::Gauges;
 
@@ -34,6 +34,7 @@ pub const KEEPALIVE_PROBES: u32 = 4;
 // ---- state ----------------------------------------------------------------------------------------------------------
 
 /// The actor that owns one listening socket.
+#[derive(Clone)]
 pub struct Listener {
     socket: Arc<TcpListener>,
     registry: Addr<Registry>,
@@ -78,13 +79,7 @@ impl Actor for Listener {
     type Context = Context<Self>;
 
     fn started(&mut self, ctx: &mut Context<Self>) {
-        let accepting = accept(
-            Arc::clone(&self.socket),
-            self.registry.clone(),
-            Arc::clone(&self.gauges),
-            Arc::clone(&self.admission),
-        );
-        ctx.spawn(accepting.into_actor(self));
+        ctx.spawn(self.clone().accept().into_actor(self));
     }
 }
 
@@ -100,34 +95,31 @@ impl Handler<StopListening> for Listener {
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-async fn accept(
-    socket: Arc<TcpListener>,
-    registry: Addr<Registry>,
-    gauges: Arc<Gauges>,
-    admission: Arc<Admission>,
-) {
-    // An error is logged once, not twenty times a second.
-    let mut failing = false;
-    loop {
-        match socket.accept().await {
-            Ok((stream, peer)) => {
-                if std::mem::take(&mut failing) {
-                    tracing::info!("clients are accepted again");
+impl Listener {
+    async fn accept(self) {
+        // An error is logged once, not twenty times a second.
+        let mut failing = false;
+        loop {
+            match self.socket.accept().await {
+                Ok((stream, peer)) => {
+                    if std::mem::take(&mut failing) {
+                        tracing::info!("clients are accepted again");
+                    }
+                    if let Err(error) = prepare(&stream) {
+                        tracing::debug!(%peer, %error, "a socket option was refused");
+                    }
+                    tracing::debug!(%peer, "client connected");
+                    let local = stream.local_addr().unwrap_or(Ends::default().local);
+                    let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
+                    let (admission, ends) = (Arc::clone(&self.admission), Ends { local, peer });
+                    Connection::start_with(admission, ends, stream, registry, gauges);
                 }
-                if let Err(error) = prepare(&stream) {
-                    tracing::debug!(%peer, %error, "a socket option was refused");
+                Err(error) => {
+                    if !std::mem::replace(&mut failing, true) {
+                        tracing::warn!(%error, "cannot accept a client; retrying");
+                    }
+                    actix_rt::time::sleep(BACKOFF).await;
                 }
-                tracing::debug!(%peer, "client connected");
-                let local = stream.local_addr().unwrap_or(Ends::default().local);
-                let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
-                let ends = Ends { local, peer };
-                Connection::start_with(Arc::clone(&admission), ends, stream, registry, gauges);
-            }
-            Err(error) => {
-                if !std::mem::replace(&mut failing, true) {
-                    tracing::warn!(%error, "cannot accept a client; retrying");
-                }
-                actix_rt::time::sleep(BACKOFF).await;
             }
         }
     }
@@ -162,9 +154,38 @@ pub fn bind(address: SocketAddr) -> std::io::Result<TcpListener> {
     socket.listen(BACKLOG)
 }
 
+/// The reason, and the remedy where there is one.
+pub(in crate::actors) fn remedy(why: &Error) -> String {
+    let remedy = match why.kind() {
+        ErrorKind::AddrInUse => {
+            "another program has that port, perhaps another pendularm; --bind 127.0.0.1:0 takes a free one"
+        }
+        ErrorKind::PermissionDenied => {
+            "this user may not use that port (ports below 1024 usually need root); --bind 127.0.0.1:0 takes a free one"
+        }
+        ErrorKind::AddrNotAvailable => {
+            "this machine does not have that address; use --bind 127.0.0.1:9095"
+        }
+        _ => return why.to_string(),
+    };
+    remedy.to_owned()
+}
+
+/// Logs why the runtime does not listen on the IPv6 twin of the default address.
+pub(in crate::actors) fn report_twin(twin: SocketAddr, why: &Error) {
+    if why.kind() == ErrorKind::AddrInUse {
+        tracing::warn!(address = %twin, "another program listens there, and may get clients of localhost");
+    } else {
+        tracing::info!(address = %twin, error = %why, "not listening on IPv6");
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use std::net::TcpStream;
+    use std::io::{Read as _, pipe};
+    use std::net::{TcpListener, TcpStream};
+
+    use tracing_subscriber::util::SubscriberInitExt as _;
 
     use super::*;
 
@@ -180,5 +201,37 @@ mod tests {
         let size = SockRef::from(&stream).send_buffer_size().unwrap();
         assert!(size <= 2 * SEND_BUFFER as usize, "{size}");
         drop(waiting);
+    }
+
+    #[test]
+    fn a_twin_that_another_program_has_is_a_warning_and_no_ipv6_is_none() {
+        let other = TcpListener::bind("127.0.0.1:0").unwrap();
+        let twin = other.local_addr().unwrap();
+        let taken = TcpListener::bind(twin).unwrap_err();
+        for (why, level) in [
+            (taken, "WARN"),
+            (ErrorKind::AddrNotAvailable.into(), "INFO"),
+        ] {
+            let (mut log, writer) = pipe().unwrap();
+            let subscriber = tracing_subscriber::fmt().with_writer(Arc::new(writer));
+            let logging = subscriber.finish().set_default();
+            report_twin(twin, &why);
+            drop(logging);
+            let mut text = String::new();
+            log.read_to_string(&mut text).unwrap();
+            assert!(
+                text.contains(level) && text.contains(&twin.to_string()),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_port_of_the_systems_is_refused_with_the_remedy() {
+        let remedy = remedy(&ErrorKind::PermissionDenied.into());
+        assert!(
+            remedy.contains("need root); --bind 127.0.0.1:0"),
+            "{remedy}"
+        );
     }
 }

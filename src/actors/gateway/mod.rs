@@ -3,10 +3,7 @@
 //! **Invariant:** the runtime's own names come from the catalog. No client's input stops the service of others.
 
 pub mod connection;
-mod ends;
 pub mod files;
 pub mod limits;
 pub mod listener;
-pub mod messages;
 pub mod registry;
-pub(super) mod unbound;

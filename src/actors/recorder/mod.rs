@@ -21,7 +21,7 @@ pub use self::requests::{
 };
 use self::tape::{Begun, TapeTarget};
 use crate::actors::arm::sim::SetListener;
-use crate::actors::gateway::messages::SetTap;
+use crate::actors::gateway::registry::SetTap;
 use crate::actors::node::Call;
 use crate::actors::wire::Nodes;
 use crate::protocol::catalog::Service;

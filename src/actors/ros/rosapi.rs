@@ -9,7 +9,7 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::sleep;
 
-use crate::actors::gateway::messages::TakeCensus;
+use crate::actors::gateway::registry::TakeCensus;
 use crate::actors::node::{Ask, Call};
 use crate::actors::resources::long_work::{WorkKind, WorkPermit};
 use crate::actors::wire::{Address, Answered, Callable, Nodes};

@@ -3,15 +3,15 @@
 //! Payloads (`msg`, `args`, `values`) stay raw. Only the syntax of a forwarded payload is parsed.
 //!
 //! **Invariant:** every frame gives exactly one operation or exactly one error that names the fault, and its `id` in
-//! both cases.
+//! both cases. A member is read only for operations that have it. For all others only its syntax is checked.
 
 pub mod fields;
-mod goal_status;
-mod reader;
+mod problems;
 mod rejections;
 #[cfg(feature = "runtime")]
 pub mod token;
 
+use std::borrow::Cow;
 use std::time::Duration;
 
 use serde_json::value::RawValue;
@@ -21,8 +21,8 @@ pub use crate::protocol::limits::MAX_NAME;
 use crate::protocol::wire::fragments::Piece;
 use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::series::Series;
-pub use goal_status::GoalStatus;
-pub use reader::{OPS, read, read_start};
+use crate::protocol::wire::{json, text};
+pub use problems::{OpError, Problem};
 
 /// Longest `throttle_rate`: a year; beyond it, a delivery is never due in a connection's lifetime.
 pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
@@ -30,6 +30,8 @@ pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
 pub const MAX_QUEUE_LENGTH: usize = 100_000;
 /// Longest `timeout` of a forwarded call: a day.
 pub const MAX_TIMEOUT: Duration = Duration::from_secs(24 * 3600);
+/// Longest part of the JSON parser's message in an answer, in characters. It may quote the client.
+const MAX_PARSER_MESSAGE: usize = 160;
 
 /// A parsed frame.
 #[derive(Debug)]
@@ -211,6 +213,19 @@ pub struct ActionGoal {
     pub feedback: bool,
 }
 
+/// The final status of a goal, as in `action_msgs/msg/GoalStatus`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GoalStatus {
+    /// Never accepted.
+    Unknown = 0,
+    /// Reached.
+    Succeeded = 4,
+    /// Cancelled by a client.
+    Canceled = 5,
+    /// Replaced by another goal or ended by a reset.
+    Aborted = 6,
+}
+
 /// The kinds of names that a client can serve to others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Served {
@@ -297,78 +312,479 @@ impl Arguments {
     }
 }
 
-/// Why a frame is not a valid operation, and the form of the answer.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum OpError {
-    /// A fault that gets an error `status`.
-    #[error(transparent)]
-    Status(#[from] Problem),
-    /// A faulty call of a known service. It gets a `service_response` with `result: false`.
-    #[error("{problem}")]
-    Call {
-        /// The service that was called.
-        service: String,
-        /// The fault.
-        problem: Problem,
-    },
-    /// A faulty goal of a named action. It gets an `action_result` with `result: false`.
-    #[error("{problem}")]
-    Goal {
-        /// The action of the goal.
-        action: String,
-        /// The fault.
-        problem: Problem,
-    },
+// ---- reading --------------------------------------------------------------------------------------------------------
+
+/// The members of a frame that the runtime reads.
+const KEYS: [&str; 25] = [
+    "op",
+    "id",
+    "topic",
+    "type",
+    "msg",
+    "throttle_rate",
+    "queue_length",
+    "service",
+    "args",
+    "timeout",
+    "values",
+    "result",
+    "status",
+    "level",
+    "errors",
+    "token",
+    "command",
+    "compression",
+    "fragment_size",
+    "data",
+    "num",
+    "total",
+    "action",
+    "action_type",
+    "feedback",
+];
+
+/// The known operations, by their names on the wire.
+pub const OPS: [&str; 18] = [
+    "advertise",
+    "unadvertise",
+    "publish",
+    "subscribe",
+    "unsubscribe",
+    "advertise_service",
+    "unadvertise_service",
+    "call_service",
+    "service_response",
+    "set_level",
+    "auth",
+    "fragment",
+    "send_action_goal",
+    "cancel_action_goal",
+    "advertise_action",
+    "unadvertise_action",
+    "action_feedback",
+    "action_result",
+];
+
+/// Reads a frame. Unknown members are ignored. Of a repeated member the last one counts.
+#[must_use]
+pub fn read(frame: &str) -> Incoming {
+    let mut members = [None; KEYS.len()];
+    let read = json::members_into(frame, &KEYS, &mut members);
+    let reader = OpReader { op: "", members };
+    if let Err(error) = read {
+        let message = text::shortened(&error.to_string(), MAX_PARSER_MESSAGE);
+        return reader.refused(Problem::NotJson(message));
+    }
+    let id = reader.get("id").map(Payload::from);
+    let op = match reader.known_op() {
+        Ok(op @ "call_service") => OpReader { op, ..reader }.call(),
+        Ok(op @ "send_action_goal") => OpReader { op, ..reader }.goal(),
+        Ok(op) => {
+            let reader = OpReader { op, ..reader };
+            reader.or_bad_answer(reader.other())
+        }
+        Err(problem) => Err(OpError::Status(problem)),
+    };
+    Incoming { id, op }
 }
 
-/// A fault of an operation.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Problem {
-    /// Not a frame; holds the reason.
-    #[error("{0}")]
-    NotAFrame(String),
-    /// Not a JSON object; holds the parser's message, shortened.
-    #[error("malformed frame: {0}")]
-    NotJson(String),
-    /// There is no `op`.
-    #[error("malformed frame: op is required")]
-    NoOp,
-    /// `op` is not a string; holds its value.
-    #[error("malformed frame: op must be a string, got {0}")]
-    OpNotText(String),
-    /// An unknown operation; holds its name, shortened.
-    #[error("unknown op \"{0}\"")]
-    UnknownOp(String),
-    /// A required field is absent.
-    #[error("{op}: {field} is required")]
-    Missing {
-        /// The operation.
-        op: &'static str,
-        /// The field.
+/// Reads the members of one frame.
+struct OpReader<'a> {
+    op: &'static str,
+    members: [Option<&'a RawValue>; KEYS.len()],
+}
+
+impl<'a> OpReader<'a> {
+    fn known_op(&self) -> Result<&'static str, Problem> {
+        let raw = self.get("op").ok_or(Problem::NoOp)?;
+        let op = json::text(raw).ok_or_else(|| Problem::OpNotText(text::found(raw)))?;
+        OPS.into_iter()
+            .find(|known| *known == op)
+            .ok_or_else(|| Problem::UnknownOp(text::excerpt(&op)))
+    }
+
+    /// A call. Once its service is known, every other fault gets a `service_response`.
+    fn call(&self) -> Result<Op, OpError> {
+        let service = self.name("service").map_err(OpError::Status)?;
+        match self.timeout() {
+            Ok(timeout) => Ok(Op::CallService(CallService {
+                service,
+                args: self.args(),
+                timeout,
+            })),
+            Err(problem) => Err(OpError::Call { service, problem }),
+        }
+    }
+
+    /// Any other operation.
+    fn other(&self) -> Result<Op, Problem> {
+        Ok(match self.op {
+            "advertise" => Op::Advertise {
+                topic: self.name("topic")?,
+                type_name: self.optional_text("type")?,
+            },
+            "unadvertise" => Op::Unadvertise {
+                topic: self.name("topic")?,
+            },
+            "publish" => Op::Publish {
+                topic: self.name("topic")?,
+                msg: self.object("msg")?,
+            },
+            "subscribe" => Op::Subscribe(self.subscription()?),
+            "unsubscribe" => Op::Unsubscribe {
+                topic: self.name("topic")?,
+            },
+            "cancel_action_goal" => Op::CancelActionGoal {
+                action: self.name("action")?,
+            },
+            "fragment" => Op::Fragment(self.piece()?),
+            "set_level" => Op::SetLevel {
+                verbosity: self.verbosity()?,
+                errors: self.error_form()?,
+            },
+            "auth" => self.auth()?,
+            op if op.contains("action") => self.serve(Served::Action)?,
+            _ => self.serve(Served::Service)?,
+        })
+    }
+
+    fn subscription(&self) -> Result<Subscribe, Problem> {
+        if let Some(id) = self.get("id") {
+            self.short("id", id.get())?;
+        }
+        Ok(Subscribe {
+            topic: self.name("topic")?,
+            type_name: self.optional_text("type")?,
+            throttle: self.throttle()?,
+            queue_length: self.queue_length()?,
+            // Merging with the default removes the fragment size of a binary encoding, which is never split.
+            encoding: Encoding::default().merged(Encoding {
+                compression: self.compression()?,
+                fragment_size: self.fragment_size()?,
+                ros1_stamps: false,
+            }),
+        })
+    }
+
+    fn compression(&self) -> Result<Compression, Problem> {
+        let expected = "none, png, cbor or cbor-raw";
+        let compression = self.optional("compression", expected, |raw| {
+            match json::text(raw)?.as_ref() {
+                "none" | "png" => Some(Compression::None),
+                "cbor" => Some(Compression::Cbor),
+                "cbor-raw" => Some(Compression::CborRaw),
+                _ => None,
+            }
+        })?;
+        Ok(compression.unwrap_or_default())
+    }
+
+    fn fragment_size(&self) -> Result<Option<usize>, Problem> {
+        let size = self.optional("fragment_size", "an integer, at least 1", |raw| {
+            match raw.get() {
+                "null" => Some(None),
+                _ => json::integer(raw).filter(|size| *size > 0).map(Some),
+            }
+        })?;
+        // With only powers of two, a message is split in few ways, for any number of subscribers.
+        let size = size.flatten().map(|size| 1 << size.ilog2());
+        Ok(size.and_then(|size: u64| usize::try_from(size).ok()))
+    }
+
+    fn piece(&self) -> Result<Piece, Problem> {
+        let id = self.required("id")?;
+        self.short("id", id.get())?;
+        // A number that does not fit is refused as too large below.
+        let index = |field| {
+            let number = self.typed(field, "an integer, at least 0", json::integer)?;
+            Ok(usize::try_from(number).unwrap_or(usize::MAX))
+        };
+        Ok(Piece {
+            id: id.get().to_owned(),
+            data: self.typed("data", "a string", json::text)?.into_owned(),
+            num: index("num")?,
+            total: index("total")?,
+        })
+    }
+
+    fn verbosity(&self) -> Result<Verbosity, Problem> {
+        let expected = "info, warning, error or none";
+        self.typed("level", expected, |raw| {
+            let name = json::text(raw)?;
+            let mut levels = Level::ALL.into_iter();
+            let level = levels.find(|level| level.name() == name);
+            (level.is_some() || name == "none").then_some(Verbosity(level))
+        })
+    }
+
+    fn error_form(&self) -> Result<Option<ErrorForm>, Problem> {
+        self.optional("errors", "object or text", |raw| {
+            let name = json::text(raw)?;
+            let mut forms = ErrorForm::ALL.into_iter();
+            forms.find(|form| form.name() == name)
+        })
+    }
+
+    /// Reads a client's token, if there is one. A command of this program marks itself.
+    fn auth(&self) -> Result<Op, Problem> {
+        let is_command = self.get("command").is_some() && self.boolean("command")?;
+        let token = self.get("token").map(|raw| self.secret(raw)).transpose()?;
+        Ok(Op::Auth { token, is_command })
+    }
+
+    /// A token. An error does not repeat it.
+    fn secret(&self, raw: &RawValue) -> Result<String, Problem> {
+        let token = json::text(raw).ok_or(Problem::Mistyped {
+            op: self.op,
+            field: "token",
+            expected: "a string",
+            found: "something else".to_owned(),
+        })?;
+        self.short("token", &token)?;
+        Ok(token.into_owned())
+    }
+
+    /// The member of that name, which must be one of [`KEYS`].
+    fn get(&self, field: &'static str) -> Option<&'a RawValue> {
+        let index = KEYS.iter().position(|key| *key == field)?;
+        self.members.get(index).copied().flatten()
+    }
+
+    fn required(&self, field: &'static str) -> Result<&'a RawValue, Problem> {
+        self.typed(field, "", Some)
+    }
+
+    /// An optional member, read by `read`. If `read` returns `None`, the value is not the `expected` one.
+    fn optional<T>(
+        &self,
         field: &'static str,
-    },
-    /// A field is rejected.
-    #[error("{op}: {field} must be {expected}, got {found}")]
-    Mistyped {
-        /// The operation.
-        op: &'static str,
-        /// The field.
-        field: &'static str,
-        /// The expected kind of value.
         expected: &'static str,
-        /// The received value, shortened.
-        found: String,
-    },
-    /// A name is longer than it may be: [`MAX_NAME`].
-    #[error("{op}: {field} must be at most {limit} bytes long, got {length}")]
-    TooLong {
-        /// The operation.
-        op: &'static str,
-        /// The field.
+        read: impl FnOnce(&'a RawValue) -> Option<T>,
+    ) -> Result<Option<T>, Problem> {
+        let Some(raw) = self.get(field) else {
+            return Ok(None);
+        };
+        let mistyped = || Problem::Mistyped {
+            op: self.op,
+            field,
+            expected,
+            found: text::found(raw),
+        };
+        read(raw).map(Some).ok_or_else(mistyped)
+    }
+
+    /// The same for a required member.
+    fn typed<T>(
+        &self,
         field: &'static str,
-        /// Its limit in bytes.
-        limit: usize,
-        /// Its length in bytes.
-        length: usize,
-    },
+        expected: &'static str,
+        read: impl FnOnce(&'a RawValue) -> Option<T>,
+    ) -> Result<T, Problem> {
+        let value = self.optional(field, expected, read)?;
+        value.ok_or(Problem::Missing { op: self.op, field })
+    }
+
+    /// A topic or service name.
+    fn name(&self, field: &'static str) -> Result<String, Problem> {
+        let name = self.typed(field, "a non-empty string", |raw| {
+            json::text(raw).filter(|name| !name.is_empty())
+        })?;
+        self.short(field, &name)?;
+        Ok(name.into_owned())
+    }
+
+    fn short(&self, field: &'static str, text: &str) -> Result<(), Problem> {
+        let limit = MAX_NAME;
+        if text.len() <= limit {
+            return Ok(());
+        }
+        Err(Problem::TooLong {
+            op: self.op,
+            field,
+            limit,
+            length: text.len(),
+        })
+    }
+
+    fn optional_text(&self, field: &'static str) -> Result<Option<String>, Problem> {
+        let text = self.optional(field, "a string", json::text)?;
+        self.short(field, text.as_deref().unwrap_or_default())?;
+        Ok(text.map(Cow::into_owned))
+    }
+
+    fn boolean(&self, field: &'static str) -> Result<bool, Problem> {
+        self.typed(field, "true or false", json::boolean)
+    }
+
+    /// A ROS message, which is an object.
+    fn object(&self, field: &'static str) -> Result<Payload, Problem> {
+        let object = self.typed(field, "an object", |raw| {
+            raw.get().starts_with('{').then_some(raw)
+        })?;
+        Ok(object.into())
+    }
+
+    fn throttle(&self) -> Result<Duration, Problem> {
+        let expected = "a number of ms, at least 0";
+        let rate = self.optional("throttle_rate", expected, |raw| {
+            json::number(raw).filter(|rate| rate.is_finite() && *rate >= 0.0)
+        })?;
+        Ok(duration(rate.unwrap_or_default() / 1000.0, MAX_THROTTLE))
+    }
+
+    fn queue_length(&self) -> Result<usize, Problem> {
+        let length = self.optional("queue_length", "an integer, at least 0", json::integer)?;
+        let length = usize::try_from(length.unwrap_or_default());
+        Ok(length.unwrap_or(MAX_QUEUE_LENGTH).min(MAX_QUEUE_LENGTH))
+    }
+
+    fn args(&self) -> Arguments {
+        let Some(args) = self.get("args").map(Payload::from) else {
+            return Arguments::none();
+        };
+        match args.get().as_bytes().first() {
+            Some(b'{') => Arguments::Object(args),
+            Some(b'[') => Arguments::Positional(args),
+            Some(b'n') => Arguments::none(),
+            _ => Arguments::Neither(args),
+        }
+    }
+
+    fn timeout(&self) -> Result<Option<Duration>, Problem> {
+        let expected = "a number of seconds greater than 0";
+        let timeout = self.optional("timeout", expected, |raw| {
+            json::number(raw).filter(|timeout| timeout.is_finite() && *timeout > 0.0)
+        })?;
+        Ok(timeout.map(|timeout| duration(timeout, MAX_TIMEOUT)))
+    }
+}
+
+/// A finite number of seconds, 0 or more, as a duration of at most `longest`.
+fn duration(seconds: f64, longest: Duration) -> Duration {
+    Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
+}
+
+// ---- goals and cancellations, and the ops of clients that serve -----------------------------------------------------
+
+impl OpReader<'_> {
+    /// A goal. Once its action is known, every other fault gets an `action_result`.
+    fn goal(&self) -> Result<Op, OpError> {
+        let action = self.name("action").map_err(OpError::Status)?;
+        match self.goal_for(&action) {
+            Ok(goal) => Ok(Op::SendActionGoal(goal)),
+            Err(problem) => Err(OpError::Goal { action, problem }),
+        }
+    }
+
+    fn goal_for(&self, action: &str) -> Result<ActionGoal, Problem> {
+        if let Some(id) = self.get("id") {
+            self.short("id", id.get())?;
+        }
+        Ok(ActionGoal {
+            type_name: self.optional_text("action_type")?,
+            args: self.args(),
+            feedback: match self.get("feedback") {
+                Some(_) => self.boolean("feedback")?,
+                None => false,
+            },
+            action: action.to_owned(),
+        })
+    }
+
+    /// An operation of a client that serves.
+    fn serve(&self, kind: Served) -> Result<Op, Problem> {
+        if matches!(
+            self.op,
+            "service_response" | "action_feedback" | "action_result"
+        ) {
+            self.required("id")?;
+        }
+        let name = self.name(kind.noun())?;
+        let op = match self.op {
+            "advertise_service" | "advertise_action" => ProviderOp::Advertise {
+                type_name: self.optional_text("type")?,
+            },
+            "unadvertise_service" | "unadvertise_action" => ProviderOp::Unadvertise,
+            "service_response" => {
+                let result = self.boolean("result")?;
+                ProviderOp::Respond {
+                    // The values of a failure may be a text with the reason.
+                    values: match result {
+                        true => self.object("values")?,
+                        false => self.required("values")?.into(),
+                    },
+                    result,
+                    status: self
+                        .optional("status", "a string", json::text)?
+                        .map(Cow::into_owned),
+                }
+            }
+            "action_feedback" => ProviderOp::Feedback {
+                values: self.object("values")?,
+            },
+            _ => {
+                let is_good = self.boolean("result")?;
+                ProviderOp::End {
+                    // Here a failure may also have none.
+                    values: match self.get("values") {
+                        Some(_) if is_good => self.object("values")?,
+                        values => Payload::from(values.unwrap_or(RawValue::NULL)),
+                    },
+                    status: self.goal_status(is_good)?,
+                    result: is_good,
+                }
+            }
+        };
+        Ok(Op::Serve { kind, name, op })
+    }
+
+    fn goal_status(&self, is_good: bool) -> Result<u8, Problem> {
+        let status = self.optional("status", "an integer from 0 to 6", |raw| {
+            let status = u8::try_from(json::integer(raw)?).ok();
+            status.filter(|status| *status <= GoalStatus::Aborted as u8)
+        })?;
+        let usual = if is_good {
+            GoalStatus::Succeeded
+        } else {
+            GoalStatus::Aborted
+        };
+        Ok(status.unwrap_or(usual as u8))
+    }
+}
+
+// ---- answers: where one is bad, the op says which call or goal it is for --------------------------------------------
+
+/// Reads the start of a frame that is refused for the reason `why`. It may be the answer to a call, which then fails.
+#[must_use]
+pub fn read_start(start: &[u8], why: &impl ToString) -> Incoming {
+    let text = start.utf8_chunks().next();
+    let mut members = [None; KEYS.len()];
+    // The members before its end or its fault count.
+    let _ = json::members_into(text.map_or("", |one| one.valid()), &KEYS, &mut members);
+    OpReader { op: "", members }.refused(Problem::NotAFrame(why.to_string()))
+}
+
+impl OpReader<'_> {
+    /// A frame that cannot be read to its end. Members before the fault count only for an answer.
+    fn refused(self, problem: Problem) -> Incoming {
+        let op = self.known_op().unwrap_or_default();
+        let reader = OpReader { op, ..self };
+        let op = reader.or_bad_answer(Err(problem));
+        let id = reader.get("id").filter(|_| op.is_ok()).map(Payload::from);
+        Incoming { id, op }
+    }
+
+    /// Converts a fault in the answer to a call or goal to an op that ends this call or goal.
+    fn or_bad_answer(&self, read: Result<Op, Problem>) -> Result<Op, OpError> {
+        let kind = match self.op {
+            "service_response" => Served::Service,
+            "action_result" => Served::Action,
+            _ => return read.map_err(OpError::Status),
+        };
+        Ok(read.unwrap_or_else(|problem| Op::BadAnswer {
+            kind,
+            name: self.name(kind.noun()).ok(),
+            problem,
+        }))
+    }
 }

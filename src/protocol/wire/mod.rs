@@ -8,5 +8,4 @@ pub mod json;
 pub mod opening;
 pub mod series;
 pub(crate) mod text;
-#[cfg(feature = "web")]
 pub mod websocket;

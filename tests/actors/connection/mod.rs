@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
-use pendularm::actors::gateway::messages::Publish;
+use pendularm::actors::node::Publish;
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages;
 use serde_json::json;

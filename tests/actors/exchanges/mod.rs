@@ -69,7 +69,7 @@ use crate::nodes::{start_whole, work_in_this_thread};
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
 use pendularm::actors::gateway::connection::admission::Admission;
-use pendularm::actors::gateway::messages::{FinishAll, RefuseCalls};
+use pendularm::actors::gateway::registry::{FinishAll, RefuseCalls};
 use pendularm::actors::resources::long_work::{PLACES, WorkKind, WorkPermit};
 use pendularm::actors::resources::memory::Memory;
 use pendularm::options::{Options, Parsed};

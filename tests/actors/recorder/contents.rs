@@ -108,7 +108,7 @@ fn calls_are_recorded_with_their_answers() {
 #[test]
 fn a_frame_that_is_too_long_is_left_out_and_counted() {
     use pendularm::actors::ConnectionId;
-    use pendularm::actors::gateway::messages::Tapped;
+    use pendularm::actors::gateway::registry::Tapped;
     use pendularm::protocol::catalog::Service;
     use pendularm::protocol::wire::json::Payload;
     use serde_json::value::RawValue;

@@ -7,7 +7,7 @@ mod replays;
 use std::sync::{Arc, Mutex};
 
 use pendularm::actors::arm::sim::SetListener;
-use pendularm::actors::gateway::messages::SetTap;
+use pendularm::actors::gateway::registry::SetTap;
 use pendularm::actors::recorder::listeners;
 use pendularm::math::integrator::Method;
 use pendularm::record::{

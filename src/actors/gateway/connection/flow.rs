@@ -11,12 +11,36 @@
 //! **Invariant:** once a query for a client fails, its unread bytes are not queried again, and nothing is held back.
 
 use std::collections::VecDeque;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::time::Duration;
 
 use tokio::time::Instant;
 
-use super::Ends;
 use crate::protocol::outbox::MAX_AGE;
+
+/// The two addresses of a client's connection. If one is unknown, the client counts as local.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ends {
+    /// The runtime's.
+    pub local: SocketAddr,
+    /// The client's.
+    pub peer: SocketAddr,
+}
+
+/// Unknown ends, as of a local client.
+impl Default for Ends {
+    fn default() -> Self {
+        SocketAddr::from((Ipv4Addr::LOCALHOST, 0)).into()
+    }
+}
+
+/// A local client.
+impl From<SocketAddr> for Ends {
+    fn from(local: SocketAddr) -> Self {
+        let peer = local;
+        Self { local, peer }
+    }
+}
 
 /// Returns the bytes that a client has not read, if that is known.
 pub type UnreadSource = Box<dyn FnMut() -> Option<usize>>;
@@ -192,7 +216,7 @@ mod sockets {
         socket_with,
     };
 
-    use crate::actors::gateway::ends::Ends;
+    use crate::actors::gateway::connection::flow::Ends;
 
     /// Bytes of the header of a netlink message.
     const HEAD: usize = 16;
@@ -332,7 +356,7 @@ mod sockets {
 
 #[cfg(not(target_os = "linux"))]
 mod sockets {
-    use crate::actors::gateway::ends::Ends;
+    use crate::actors::gateway::connection::flow::Ends;
 
     pub(super) fn unread(_: Ends) -> Option<usize> {
         None

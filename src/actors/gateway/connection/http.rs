@@ -12,14 +12,13 @@ use tokio::time::Instant;
 use super::admission::HeldSlot;
 use super::session::{ClientSession, HeldPlace, Opened};
 use super::transport::Transport;
-use super::websocket::WebSocket;
-use crate::actors::gateway::messages::{Outlets, Refused, Request};
+use crate::actors::gateway::registry::{Refused, Request};
 use crate::protocol::messages::ErrorForm;
-use crate::protocol::op::{Op, Verbosity};
+use crate::protocol::op::{Incoming, Op, Verbosity};
 use crate::web::serve::{self, Gate};
 
-/// A client without a place: its outlets, its slot, and the reason. `None` means that the token is missing.
-pub(super) type Newcomer<'a> = (Outlets, HeldSlot<'a>, Option<Refused>);
+/// A client without a place: its slot, and the reason. `None` means that the token is missing.
+pub(super) type Newcomer<'a> = (HeldSlot<'a>, Option<Refused>);
 
 /// Admits or refuses the requests of one client.
 struct HttpGate<'a> {
@@ -31,10 +30,10 @@ struct HttpGate<'a> {
 
 impl Gate for HttpGate<'_> {
     async fn admit(&self) -> Result<(), String> {
-        let Some((outlets, slot, _)) = self.newcomer.take() else {
+        let Some((slot, _)) = self.newcomer.take() else {
             return Ok(());
         };
-        let place = self.session.wait_for_place(&outlets, &slot).await;
+        let place = self.session.wait_for_place(&slot).await;
         let place = place.map_err(|why| self.session.turn_away(Some(why)))?;
         self.place.set(Some(place));
         Ok(())
@@ -62,7 +61,7 @@ impl ClientSession {
             Ok(place) => (Some(place), None),
             Err(newcomer) => (None, Some(newcomer)),
         };
-        let evicted = newcomer.as_ref().map(|(_, slot, _)| slot.evicted());
+        let evicted = newcomer.as_ref().map(|(slot, _)| slot.evicted());
         let gate = HttpGate {
             session: self,
             newcomer: Cell::new(newcomer),
@@ -72,7 +71,7 @@ impl ClientSession {
         let crowded = async {
             if let Some(evicted) = evicted {
                 evicted.await;
-                if let Some((.., why)) = gate.newcomer.take() {
+                if let Some((_, why)) = gate.newcomer.take() {
                     return self.turn_away(why);
                 }
             }
@@ -89,17 +88,19 @@ impl ClientSession {
         let place = gate.place.take()?;
         let quiet = Request {
             from: place.id(),
-            id: None,
-            op: Op::SetLevel {
-                verbosity: Verbosity::NONE,
-                errors: Some(ErrorForm::Text),
+            incoming: Incoming {
+                id: None,
+                op: Ok(Op::SetLevel {
+                    verbosity: Verbosity::NONE,
+                    errors: Some(ErrorForm::Text),
+                }),
             },
             permit: None,
         };
         let _ = self.registry.send(quiet).await;
         Some(Opened {
             place: Ok(place),
-            transport: Transport::WebSocket(Box::new(WebSocket::new(stream))),
+            transport: Transport::socket(stream),
             first: behind.into(),
         })
     }

@@ -9,43 +9,37 @@
 //! **Invariant:** responses and statuses are never dropped. While too many wait, the client is not read.
 
 pub mod admission;
-mod computations;
+mod client;
 mod flow;
 #[cfg(feature = "web")]
 mod http;
-mod outgoing;
 mod reader;
 mod session;
-mod timer;
+#[cfg_attr(
+    not(feature = "web"),
+    allow(dead_code, reason = "only an HTTP request opens a WebSocket")
+)]
 mod transport;
 mod turns;
-#[cfg(feature = "web")]
-mod websocket;
-mod writer;
 
+use std::cell::RefCell;
+use std::pin::Pin;
+use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use actix::prelude::*;
-use bytes::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::Notify;
-use tokio::time::Instant;
 
 use self::admission::Admission;
-use self::computations::Computations;
-pub use self::flow::UnreadSource;
-use self::outgoing::Outgoing;
-use self::session::{ClientSession, HeldPlace};
-use self::transport::Transport;
-pub use super::ends::Ends;
-use super::limits::MAX_RESPONSES_WAITING;
-use super::messages::{Outlets, Request, ToClient};
-use super::registry::Registry;
+use self::client::ClientState;
+pub use self::flow::{Ends, UnreadSource};
+use self::reader::{ClientReader, discard_input};
+use self::session::{ClientSession, Opened};
+use super::registry::{Outlets, Registry, ToClient};
 use crate::actors::panics::{contain, contained};
 use crate::actors::resources::gauges::Gauges;
-use crate::actors::resources::memory::Memory;
-use crate::protocol::catalog::Service;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -53,28 +47,9 @@ use crate::protocol::catalog::Service;
 pub struct Connection<S> {
     /// The stream and the conditions of admission, until the session takes them.
     newcomer: Option<(S, Arc<Admission>)>,
-    ends: Ends,
-    registry: Addr<Registry>,
-    /// The shared memory for long frames.
-    memory: Memory,
-    /// The stream, after the session has ended.
-    transport: Option<Transport<S>>,
-    /// Its place among the clients.
-    place: Option<HeldPlace>,
-    outgoing: Outgoing,
-    computations: Computations,
-    /// Time of the last write or finished computation while the reader waited for one.
-    room_since: Instant,
-    /// Set while the reason of a failed call is sent in `values` too.
-    wants_text: Arc<AtomicBool>,
-    /// Set when nothing more is read. Queued messages are still sent.
-    is_finishing: bool,
-    /// Notifies the session of that.
+    client: Rc<RefCell<ClientState<S>>>,
+    /// Notifies the session that the runtime is ending.
     finish: Arc<Notify>,
-    /// Set if the client uses another protocol or violates a rule. It gets the reason, and its input is discarded.
-    is_refused: bool,
-    /// Set when the reader has ended.
-    is_read_to_its_end: bool,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
@@ -105,21 +80,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         registry: Addr<Registry>,
         gauges: Arc<Gauges>,
     ) -> Addr<Self> {
+        let client = ClientState::new(ends, unread, registry, gauges);
         Self {
             newcomer: Some((stream, admission)),
-            ends,
-            registry,
-            memory: gauges.memory().clone(),
-            transport: None,
-            place: None,
-            outgoing: Outgoing::new(gauges, unread),
-            computations: Computations::default(),
-            room_since: Instant::now(),
-            wants_text: Arc::default(),
-            is_finishing: false,
+            client: Rc::new(RefCell::new(client)),
             finish: Arc::default(),
-            is_refused: false,
-            is_read_to_its_end: false,
         }
         .start()
     }
@@ -135,19 +100,20 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
         let Some((stream, admission)) = self.newcomer.take() else {
             return;
         };
+        let client = self.client.borrow();
         let outlets = Outlets {
             mailbox: ctx.address().recipient(),
-            wants_text: Arc::clone(&self.wants_text),
             gone: Arc::new(AtomicBool::new(false)),
-            backlog: self.outgoing.backlog(),
+            backlog: Arc::clone(&client.backlog),
         };
         let session = ClientSession {
-            registry: self.registry.clone(),
+            registry: client.registry.clone(),
             finish: Arc::clone(&self.finish),
             admission,
-            ends: self.ends,
+            ends: client.ends,
+            outlets,
         };
-        let opened = contained(session.run(stream, outlets)).into_actor(self);
+        let opened = contained(session.run(stream)).into_actor(self);
         ctx.spawn(opened.map(|opened, connection, ctx| match opened {
             Ok(Some(opened)) => connection.converse(opened, ctx),
             Ok(None) => ctx.stop(),
@@ -166,7 +132,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<ToClient> for Connecti
 
     /// A panic ends only this connection.
     fn handle(&mut self, message: ToClient, ctx: &mut Context<Self>) {
-        if let Err(panic) = contain(|| self.take(message)) {
+        if matches!(message, ToClient::Finish) {
+            self.finish.notify_one();
+        }
+        if let Err(panic) = contain(|| self.client.borrow_mut().accept(message)) {
             tracing::error!(%panic, "a client's actor failed; its connection ends");
             ctx.stop();
         }
@@ -175,86 +144,33 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<ToClient> for Connecti
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-impl<S> Connection<S> {
-    /// Puts a message of the registry into the outbox.
-    fn take(&mut self, message: ToClient) {
-        let outgoing = &mut self.outgoing;
-        match message {
-            ToClient::Deliver { topic, frame } => outgoing.accept(topic.as_ref(), frame),
-            ToClient::Respond { frame, service } => {
-                outgoing.push_response(frame, service.map_or(&[], Service::supersedes));
-                if service.is_some_and(Service::is_computation) {
-                    self.computations.end();
-                    self.room_since = Instant::now();
-                    self.start_computation();
-                }
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
+    /// Reads and writes until the client disconnects, or has received all its messages.
+    fn converse(&self, opened: Opened<S>, ctx: &mut Context<Self>) {
+        let client = Rc::clone(&self.client);
+        client.borrow_mut().transport = Some(opened.transport);
+        let reading: Pin<Box<dyn Future<Output = ()>>> = match opened.place {
+            Ok(place) => Box::pin(ClientReader::new(&client, place, opened.first).run()),
+            Err(why) => {
+                client.borrow_mut().refuse(&why);
+                client.borrow_mut().is_finishing = true;
+                Box::pin(discard_input(Rc::clone(&client)))
             }
-            ToClient::Configure { topic, throttle } => outgoing.configure(&topic, throttle),
-            ToClient::Finish => self.finish(),
-        }
-    }
-
-    /// Refuses the client: it gets this status, and its further input is discarded.
-    fn refuse(&mut self, status: Bytes) {
-        self.is_refused = true;
-        self.outgoing.push_response(status, &[]);
-    }
-
-    /// Ends reading. Queued messages are still sent.
-    fn finish(&mut self) {
-        self.is_finishing = true;
-        self.finish.notify_one();
-    }
-
-    /// Whether the client may be read: neither too many responses nor too many computations wait.
-    fn may_read(&self) -> bool {
-        self.may_compute() && !self.computations.are_too_many()
-    }
-
-    /// Whether another computation may start: not too many responses wait.
-    const fn may_compute(&self) -> bool {
-        self.outgoing.response_bytes() <= MAX_RESPONSES_WAITING
-    }
-
-    /// Notes that `bytes` were written. Returns whether that allows the client to be read again.
-    fn note_written(&mut self, bytes: usize) -> bool {
-        let may_read = self.may_read();
-        self.outgoing.written(bytes);
-        if !may_read {
-            self.room_since = Instant::now();
-        }
-        self.start_computation();
-        !may_read && self.may_read()
-    }
-
-    /// Queues a heavy call.
-    fn enqueue_computation(&mut self, request: Request, length: usize) {
-        self.computations.push(request, length);
-        self.start_computation();
-    }
-
-    /// Starts the next computation if none runs and not too many responses wait.
-    fn start_computation(&mut self) {
-        if self.computations.can_start()
-            && self.may_compute()
-            && let Some(request) = self.computations.start()
-        {
-            self.registry.do_send(request);
-        }
-    }
-
-    /// Whether a computation runs or waits.
-    fn is_computing(&self) -> bool {
-        !self.computations.is_empty()
-    }
-
-    /// Drops the computations: the client no longer waits for them.
-    fn abandon_computations(&mut self) {
-        self.computations = Computations::default();
-    }
-
-    /// Whether nothing more is read or computed.
-    fn is_done(&self) -> bool {
-        self.is_finishing && !self.is_computing()
+        };
+        let reading = contained(reading).into_actor(self);
+        ctx.spawn(reading.map(|ended, connection, ctx| match ended {
+            Ok(()) => connection.client.borrow_mut().is_read_to_its_end = true,
+            Err(panic) => {
+                tracing::error!(%panic, "a client's reader failed; its connection ends");
+                ctx.stop();
+            }
+        }));
+        let writing = contained(client::write(client)).into_actor(self);
+        ctx.spawn(writing.map(|ended, _, ctx| {
+            if let Err(panic) = ended {
+                tracing::error!(%panic, "a client's writer failed; its connection ends");
+            }
+            ctx.stop();
+        }));
     }
 }

@@ -17,18 +17,19 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 use super::admission::{
     Admission, AuthError, HeldSlot, WRONG_TOKEN_TIME, authenticate, first_op, is_command,
 };
+use super::flow::Ends;
 use super::transport::Transport;
 use crate::actors::ConnectionId;
-use crate::actors::gateway::ends::Ends;
 use crate::actors::gateway::limits::{
     FRAME_TIME, HEAD_TIME, LINGER, LOOK_AGAIN, OPENING_TIME, READ_BYTES,
 };
-use crate::actors::gateway::messages::{Connect, CountRefusal, Disconnect, Outlets, Refused};
-use crate::actors::gateway::registry::Registry;
+use crate::actors::gateway::registry::{
+    Connect, CountRefusal, Disconnect, Outlets, Refused, Registry,
+};
 use crate::protocol::messages::{self, Level};
 #[cfg(feature = "web")]
 use crate::protocol::wire::frame::Foreign;
-use crate::protocol::wire::frame::{FrameReader, Opening, opening};
+use crate::protocol::wire::frame::{Opening, opening};
 #[cfg(feature = "web")]
 use crate::web::response::refusal;
 
@@ -39,6 +40,7 @@ pub(super) struct ClientSession {
     pub(super) finish: Arc<Notify>,
     pub(super) admission: Arc<Admission>,
     pub(super) ends: Ends,
+    pub(super) outlets: Outlets,
 }
 
 /// A client that exchanges frames from now on.
@@ -85,7 +87,7 @@ enum Detected {
 
 impl ClientSession {
     /// Runs the session. Returns the client if it exchanges frames, or if it is refused in a frame.
-    pub(super) async fn run<S>(self, mut stream: S, outlets: Outlets) -> Option<Opened<S>>
+    pub(super) async fn run<S>(self, mut stream: S) -> Option<Opened<S>>
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
@@ -95,7 +97,7 @@ impl ClientSession {
             // A client without the token makes no request to the registry.
             Err(None)
         } else {
-            self.connect(&outlets, false).await.map_err(Some)
+            self.connect(false).await.map_err(Some)
         };
         let how = match place {
             Ok(_) => self.detect(&mut stream, &mut first, None).await,
@@ -115,17 +117,15 @@ impl ClientSession {
                 place = match how {
                     #[cfg(feature = "web")]
                     Detected::Http(due) => {
-                        let newcomer = Err((outlets, slot, why));
-                        return self.serve_http(stream, first, due, newcomer).await;
+                        return self.serve_http(stream, first, due, Err((slot, why))).await;
                     }
-                    Detected::Command => self.wait_for_place(&outlets, &slot).await.map_err(Some),
-                    Detected::Json => self.connect(&outlets, false).await.map_err(Some),
+                    Detected::Command => self.wait_for_place(&slot).await.map_err(Some),
+                    Detected::Json => self.connect(false).await.map_err(Some),
                     Detected::Refused(_) | Detected::Gone => place,
                 };
                 how
             }
         };
-        drop(outlets);
         let place = match (how, place) {
             (Detected::Gone, _) => {
                 let _ = timeout(LINGER, stream.shutdown()).await;
@@ -140,7 +140,7 @@ impl ClientSession {
         };
         Some(Opened {
             place,
-            transport: Transport::Plain(stream, FrameReader::new()),
+            transport: Transport::plain(stream),
             first,
         })
     }
@@ -175,14 +175,10 @@ impl ClientSession {
     }
 
     /// Takes a place, possibly a kept one. If none is free, waits up to [`OPENING_TIME`] for one.
-    pub(super) async fn wait_for_place(
-        &self,
-        outlets: &Outlets,
-        slot: &HeldSlot<'_>,
-    ) -> Result<HeldPlace, Refused> {
+    pub(super) async fn wait_for_place(&self, slot: &HeldSlot<'_>) -> Result<HeldPlace, Refused> {
         let due = Instant::now() + OPENING_TIME;
         loop {
-            let place = self.connect(outlets, true).await;
+            let place = self.connect(true).await;
             if !matches!(place, Err(Refused::Full { .. })) || Instant::now() >= due {
                 return place;
             }
@@ -212,9 +208,9 @@ impl ClientSession {
     }
 
     /// Registers the client.
-    async fn connect(&self, outlets: &Outlets, may_use_kept: bool) -> Result<HeldPlace, Refused> {
+    async fn connect(&self, may_use_kept: bool) -> Result<HeldPlace, Refused> {
         let connect = Connect {
-            outlets: outlets.clone(),
+            outlets: self.outlets.clone(),
             from: self.ends.peer.ip().to_canonical(),
             may_use_kept,
         };

@@ -1,38 +1,67 @@
-//! The transport of a client's frames: plain bytes, or a WebSocket around them.
+//! The transport of a client's frames: plain bytes, or a WebSocket around them. Pings and closes of a WebSocket are
+//! answered. TCP keepalive detects a peer whose machine is gone, for both.
 //!
 //! **Invariant:** the reader gets frames, and the writer passes whole frames that end in a newline, for both
-//! transports.
+//! transports. At most one write and one pong of a WebSocket wait to be written.
 
 use std::io::{self, IoSlice};
 use std::pin::{Pin, pin};
 use std::task::{Context, Poll, ready};
 
-use bytes::{BufMut, Bytes, BytesMut};
+use bytes::{Buf, BufMut, Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
 use tokio::time::Instant;
 
-#[cfg(feature = "web")]
-use super::websocket::WebSocket;
-use crate::actors::gateway::ends::ClientLost;
-use crate::actors::gateway::limits::{READ_BYTES, WRITE_BYTES, WRITE_FRAMES};
+use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, READ_BYTES, WRITE_BYTES, WRITE_FRAMES};
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::wire::frame::{FrameError, FramePart, FrameReader};
+use crate::protocol::wire::websocket::{MessageReader, SocketEnd, append_frame, opcode};
+
+/// Bytes of payload in one WebSocket frame and in one write. A longer message is sent in fragments, so that the
+/// client's progress is measurable.
+const FRAGMENT: usize = 32 * 1024;
+
+/// Codes of close frames.
+const GOING_AWAY: u16 = 1001;
+const PROTOCOL_ERROR: u16 = 1002;
+const POLICY_VIOLATION: u16 = 1008;
+
+/// Why a client can no longer be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ClientLost {
+    /// It has disconnected.
+    Gone,
+    /// It has violated a rule, and gets an error at the end.
+    Refused,
+}
 
 /// The stream of a served client, and its protocol.
-pub(super) enum Transport<S> {
-    Plain(S, FrameReader),
-    #[cfg(feature = "web")]
-    WebSocket(Box<WebSocket<S>>),
+pub(super) struct Transport<S> {
+    stream: S,
+    protocol: Protocol,
+}
+
+enum Protocol {
+    Plain(FrameReader),
+    WebSocket(Box<WebSocket>),
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
+    /// A stream of lines.
+    pub(super) const fn plain(stream: S) -> Self {
+        let protocol = Protocol::Plain(FrameReader::new());
+        Self { stream, protocol }
+    }
+
+    /// A stream after the handshake of a WebSocket.
+    pub(super) fn socket(stream: S) -> Self {
+        let protocol = Protocol::WebSocket(Box::new(WebSocket::new()));
+        Self { stream, protocol }
+    }
+
     /// Whether its frames are messages, which may be binary. The peer then answers the end of the connection.
-    pub(super) const fn has_messages(&self) -> bool {
-        match self {
-            Self::Plain(..) => false,
-            #[cfg(feature = "web")]
-            Self::WebSocket(_) => true,
-        }
+    pub(super) const fn is_socket(&self) -> bool {
+        matches!(self.protocol, Protocol::WebSocket(_))
     }
 
     // ---- receiving --------------------------------------------------------------------------------------------------
@@ -44,99 +73,83 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         cx: &mut Context<'_>,
         chunk: &mut BytesMut,
     ) -> Poll<Result<usize, ClientLost>> {
-        let stream = match self {
-            Self::Plain(stream, _) => stream,
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => &mut socket.stream,
-        };
-        let read = ready!(pin!(read_some(stream, chunk)).poll(cx));
-        Poll::Ready(match (read, self) {
+        let read = ready!(pin!(read_some(&mut self.stream, chunk)).poll(cx));
+        Poll::Ready(match (read, &mut self.protocol) {
             (Err(_), _) => Err(ClientLost::Gone),
-            #[cfg(feature = "web")]
-            (Ok(0), Self::WebSocket(socket)) => Err(socket.violated()),
+            (Ok(0), Protocol::WebSocket(socket)) => Err(socket.violated()),
             (Ok(bytes), _) => Ok(bytes),
         })
     }
 
     /// Adds received bytes. Cut off all frames before the next push, so that memory stays bounded.
     pub(super) fn push(&mut self, chunk: &[u8]) {
-        match self {
-            Self::Plain(_, frames) => frames.push(chunk),
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.messages.push(chunk),
+        match &mut self.protocol {
+            Protocol::Plain(frames) => frames.push(chunk),
+            Protocol::WebSocket(socket) => socket.messages.push(chunk),
         }
     }
 
     /// Cuts off the next frame, if it is complete. Returns an error if none can follow.
     pub(super) fn cut(&mut self) -> Result<Option<FramePart>, ClientLost> {
-        match self {
-            Self::Plain(_, frames) => Ok(frames.cut()),
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.cut(),
+        match &mut self.protocol {
+            Protocol::Plain(frames) => Ok(frames.cut()),
+            Protocol::WebSocket(socket) => match socket.messages.cut() {
+                Some(part) => Ok(Some(part)),
+                None => socket.check_end().map(|()| None),
+            },
         }
     }
 
-    /// Looks for the end of the client in `chunk`, which follows frames that wait. Returns an error if it has ended.
+    /// Reads pings and a close in `chunk`, which follow messages that wait. Returns an error if the client has ended.
+    /// Lines stay in `chunk`.
     pub(super) fn look_ahead(&mut self, chunk: &mut BytesMut) -> Result<(), ClientLost> {
-        match self {
-            Self::Plain(..) => {
-                let _ = chunk;
-                Ok(())
-            }
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.look_ahead(chunk),
-        }
+        let Protocol::WebSocket(socket) = &mut self.protocol else {
+            return Ok(());
+        };
+        socket.messages.push(chunk);
+        chunk.clear();
+        socket.messages.look_ahead(FRAMES_IN_A_ROW);
+        socket.check_end()
     }
 
     /// Bytes that [`look_ahead`](Self::look_ahead) has taken.
     pub(super) fn taken_ahead(&self) -> usize {
-        match self {
-            Self::Plain(..) => 0,
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.messages.waiting(),
+        match &self.protocol {
+            Protocol::Plain(_) => 0,
+            Protocol::WebSocket(socket) => socket.messages.waiting(),
         }
     }
 
     /// Whether a frame is incomplete.
     pub(super) fn is_unfinished(&self) -> bool {
-        match self {
-            Self::Plain(_, frames) => frames.is_unfinished(),
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.messages.is_unfinished(),
+        match &self.protocol {
+            Protocol::Plain(frames) => frames.is_unfinished(),
+            Protocol::WebSocket(socket) => socket.messages.is_unfinished(),
         }
     }
 
     /// Whether a frame is incomplete, and so long that it needs a memory permit.
     pub(super) fn is_long_coming(&self) -> bool {
-        let buffered = match self {
-            Self::Plain(_, frames) => frames.buffered(),
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.messages.buffered(),
+        let buffered = match &self.protocol {
+            Protocol::Plain(frames) => frames.buffered(),
+            Protocol::WebSocket(socket) => socket.messages.buffered(),
         };
         buffered > MEDIUM && self.is_unfinished()
     }
 
     /// Ends the stream. An incomplete frame is an error.
     pub(super) fn finish(&mut self) -> Option<FrameError> {
-        match self {
-            Self::Plain(_, frames) => frames.finish(),
-            #[cfg(feature = "web")]
-            Self::WebSocket(_) => None,
+        match &mut self.protocol {
+            Protocol::Plain(frames) => frames.finish(),
+            Protocol::WebSocket(_) => None,
         }
     }
 
     /// Abandons a frame that takes too long. Returns an error if the transport itself sends `why` to the client.
     pub(super) fn give_up(&mut self, why: &'static str) -> Result<(), ClientLost> {
-        match self {
-            Self::Plain(..) => {
-                let _ = why;
-                Ok(())
-            }
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => {
-                socket.refuse(why);
-                Err(ClientLost::Refused)
-            }
+        match &mut self.protocol {
+            Protocol::Plain(_) => Ok(()),
+            Protocol::WebSocket(socket) => Err(socket.refuse(POLICY_VIOLATION, why)),
         }
     }
 
@@ -149,48 +162,43 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         cx: &mut Context<'_>,
         frames: impl ExactSizeIterator<Item = &'a Bytes>,
     ) -> Poll<io::Result<usize>> {
-        match self {
-            Self::Plain(stream, _) => write_some(stream, cx, frames),
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.poll_write(cx, frames),
+        let stream = &mut self.stream;
+        match &mut self.protocol {
+            Protocol::Plain(_) => write_some(stream, cx, frames),
+            Protocol::WebSocket(socket) => socket.poll_write(stream, cx, frames),
         }
     }
 
     /// Sends the transport's own frames, such as answers to pings. Called when there is nothing else to send.
     pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        match self {
-            Self::Plain(..) => {
-                let _ = cx;
-                Poll::Ready(Ok(()))
-            }
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.poll_flush(cx),
+        match &mut self.protocol {
+            Protocol::Plain(_) => Poll::Ready(Ok(())),
+            Protocol::WebSocket(socket) => socket.poll_flush(&mut self.stream, cx),
         }
     }
 
     /// Time when the client last took a byte of the current write. `None` over TCP, where every write is short.
     pub(super) fn last_taken(&self) -> Option<Instant> {
-        match self {
-            Self::Plain(..) => None,
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.last_taken(),
+        match &self.protocol {
+            Protocol::Plain(_) => None,
+            Protocol::WebSocket(socket) => Some(socket.taken),
         }
     }
 
-    /// Closes the stream in an orderly way.
+    /// Closes the stream in an orderly way. The input of a refused peer is discarded, including its close frame. The end
+    /// of the stream is enough for it.
     pub(super) fn poll_end(
         &mut self,
         cx: &mut Context<'_>,
         is_refused: bool,
     ) -> Poll<io::Result<()>> {
-        match self {
-            Self::Plain(stream, _) => {
-                let _ = is_refused;
-                Pin::new(stream).poll_shutdown(cx)
+        if let Protocol::WebSocket(socket) = &mut self.protocol {
+            ready!(socket.poll_close(&mut self.stream, cx))?;
+            if !is_refused {
+                return Poll::Ready(Ok(()));
             }
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.poll_end(cx, is_refused),
         }
+        Pin::new(&mut self.stream).poll_shutdown(cx)
     }
 }
 
@@ -232,4 +240,172 @@ fn write_some<'a, S: AsyncWrite + Unpin>(
         0 => Err(io::ErrorKind::WriteZero.into()),
         written => Ok(written),
     })
+}
+
+// ---- a WebSocket: a message is a frame ------------------------------------------------------------------------------
+
+/// The state of a WebSocket.
+struct WebSocket {
+    /// The incoming messages.
+    messages: MessageReader,
+    /// Frames that are being written.
+    output: BytesMut,
+    /// The kind of the message that the next write continues, if there is one.
+    unfinished: Option<u8>,
+    /// Bytes of the writer's frames in `output`.
+    unflushed: usize,
+    /// Time when the peer last took a byte.
+    taken: Instant,
+    /// The close reason for the peer.
+    close_reason: (Option<u16>, &'static str),
+    /// The peer has closed, and accepts only a close frame.
+    is_closed: bool,
+    /// The close frame has been queued.
+    is_closing: bool,
+}
+
+impl WebSocket {
+    fn new() -> Self {
+        Self {
+            messages: MessageReader::default(),
+            output: BytesMut::new(),
+            unfinished: None,
+            unflushed: 0,
+            taken: Instant::now(),
+            close_reason: (Some(GOING_AWAY), "shutting down"),
+            is_closed: false,
+            is_closing: false,
+        }
+    }
+
+    fn check_end(&mut self) -> Result<(), ClientLost> {
+        match self.messages.end() {
+            None => Ok(()),
+            Some(SocketEnd::Closed(code)) => {
+                self.close_reason = (code, "");
+                self.is_closed = true;
+                Err(ClientLost::Gone)
+            }
+            Some(SocketEnd::Violated) => Err(self.violated()),
+        }
+    }
+
+    /// Refuses the peer, which has violated the protocol.
+    const fn violated(&mut self) -> ClientLost {
+        self.refuse(PROTOCOL_ERROR, "violates RFC 6455")
+    }
+
+    /// Refuses the peer. The close frame has the code and the reason.
+    const fn refuse(&mut self, code: u16, why: &'static str) -> ClientLost {
+        self.close_reason = (Some(code), why);
+        ClientLost::Refused
+    }
+
+    fn poll_write<'a, S: AsyncWrite + Unpin>(
+        &mut self,
+        stream: &mut S,
+        cx: &mut Context<'_>,
+        frames: impl Iterator<Item = &'a Bytes>,
+    ) -> Poll<io::Result<usize>> {
+        if self.is_closed {
+            ready!(self.poll_close(stream, cx))?;
+            return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
+        }
+        ready!(self.poll_flush(stream, cx))?;
+        if self.unflushed == 0 {
+            self.unflushed = self.put_frames(frames);
+            ready!(self.poll_flush(stream, cx))?;
+        }
+        Poll::Ready(Ok(std::mem::take(&mut self.unflushed)))
+    }
+
+    fn put_frames<'a>(&mut self, frames: impl Iterator<Item = &'a Bytes>) -> usize {
+        let mut written = 0;
+        for frame in frames {
+            let mut rest = frame.as_ref();
+            while !rest.is_empty() {
+                let room = FRAGMENT.saturating_sub(written);
+                let kind = self.unfinished.unwrap_or_else(|| kind_of(rest));
+                let (piece, is_last) = first_piece(rest, kind == opcode::TEXT, room);
+                if written > 0 && !is_last {
+                    return written;
+                }
+                written += piece.len();
+                rest.advance(piece.len());
+                let opcode = match self.unfinished {
+                    Some(_) => opcode::CONTINUATION,
+                    None => kind,
+                };
+                self.unfinished = (!is_last).then_some(kind);
+                let is_line = is_last && kind == opcode::TEXT;
+                let line = piece.strip_suffix(b"\n").filter(|_| is_line);
+                append_frame(&mut self.output, opcode, is_last, line.unwrap_or(piece));
+                if !is_last {
+                    return written;
+                }
+            }
+        }
+        written
+    }
+
+    /// Sends queued frames, and the answer to the latest ping.
+    fn poll_flush<S: AsyncWrite + Unpin>(
+        &mut self,
+        stream: &mut S,
+        cx: &mut Context<'_>,
+    ) -> Poll<io::Result<()>> {
+        loop {
+            if self.output.is_empty() {
+                match self.messages.take_ping().filter(|_| !self.is_closing) {
+                    Some(ping) => append_frame(&mut self.output, opcode::PONG, true, &ping),
+                    None => return Poll::Ready(Ok(())),
+                }
+            }
+            match ready!(Pin::new(&mut *stream).poll_write(cx, &self.output))? {
+                0 => return Poll::Ready(Err(io::ErrorKind::WriteZero.into())),
+                taken => self.output.advance(taken),
+            }
+            self.taken = Instant::now();
+        }
+    }
+
+    /// Sends the close frame.
+    fn poll_close<S: AsyncWrite + Unpin>(
+        &mut self,
+        stream: &mut S,
+        cx: &mut Context<'_>,
+    ) -> Poll<io::Result<()>> {
+        ready!(self.poll_flush(stream, cx))?;
+        if self.is_closing {
+            return Poll::Ready(Ok(()));
+        }
+        let (code, why) = self.close_reason;
+        let code = code.map(u16::to_be_bytes);
+        let mut payload = code.into_iter().flatten().collect::<Vec<u8>>();
+        payload.extend_from_slice(why.as_bytes());
+        append_frame(&mut self.output, opcode::CLOSE, true, &payload);
+        self.is_closing = true;
+        self.poll_flush(stream, cx)
+    }
+}
+
+/// The kind of a frame: JSON begins with a brace, CBOR never does.
+fn kind_of(frame: &[u8]) -> u8 {
+    if frame.first() == Some(&b'{') {
+        opcode::TEXT
+    } else {
+        opcode::BINARY
+    }
+}
+
+/// The part of a frame that fits into one WebSocket frame, and whether a message ends there. A text may be several
+/// messages, one per line.
+fn first_piece(frame: &[u8], is_text: bool, room: usize) -> (&[u8], bool) {
+    let offered = frame.get(..room).unwrap_or(frame);
+    if !is_text {
+        return (offered, offered.len() == frame.len());
+    }
+    let end = offered.iter().position(|&byte| byte == b'\n');
+    let line = end.and_then(|end| offered.get(..=end));
+    (line.unwrap_or(offered), line.is_some())
 }

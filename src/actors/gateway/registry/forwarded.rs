@@ -9,6 +9,7 @@ use tokio::time::Instant;
 
 use super::kept::KeptEntry;
 use crate::actors::ConnectionId;
+use crate::actors::node::Done;
 use crate::protocol::names::{self, OWN_ID_PREFIX};
 use crate::protocol::op::Served;
 use crate::protocol::wire::json::Payload;
@@ -17,27 +18,24 @@ use crate::protocol::wire::json::Payload;
 const LONGEST_ID: usize = 6 * (OWN_ID_PREFIX.len() + 20) + 2;
 
 /// A call or a goal.
-pub(crate) struct Forwarded {
-    pub(crate) caller: ConnectionId,
+pub(super) struct Forwarded {
+    pub(super) caller: ConnectionId,
     /// The caller's id of the request.
-    pub(crate) id: Option<Payload>,
-    pub(crate) provider: ConnectionId,
+    pub(super) id: Option<Payload>,
+    pub(super) provider: ConnectionId,
     /// The name of the service or action, as the caller spells it.
-    pub(crate) name: Box<str>,
-    pub(crate) terms: RequestTerms,
+    pub(super) name: Box<str>,
+    pub(super) kind: Served,
+    /// A call ends at its deadline. The registry may notice that later if the process was suspended. A goal has none.
+    pub(super) deadline: Option<Instant>,
+    /// The server's spelling of a goal's action. The goal can be cancelled under it.
+    pub(super) spelling: Option<Box<str>>,
+    /// Whether the sender of a goal gets feedback.
+    pub(super) wants_feedback: bool,
+    /// A caller that has stopped sending is removed when its last call has ended.
+    pub(super) _done: Option<Done>,
     /// Its part of the caller's limit [`MAX_KEPT`](crate::actors::gateway::limits::MAX_KEPT).
-    pub(crate) _entry: KeptEntry,
-}
-
-/// The differences between calls and goals.
-pub(crate) enum RequestTerms {
-    /// A call ends at its deadline. The registry may notice that later if the process was suspended.
-    Call { deadline: Instant },
-    /// A goal has no deadline. It can be cancelled under its name at the server.
-    Goal {
-        spelling: Box<str>,
-        wants_feedback: bool,
-    },
+    pub(super) _entry: KeptEntry,
 }
 
 /// A key of the index. Deadlines sort first, so the first entry is the next deadline.
@@ -49,33 +47,19 @@ enum RequestKey {
 }
 
 impl Forwarded {
-    const fn kind(&self) -> Served {
-        match self.terms {
-            RequestTerms::Call { .. } => Served::Service,
-            RequestTerms::Goal { .. } => Served::Action,
-        }
-    }
-
-    fn deadline(&self) -> Option<Instant> {
-        match self.terms {
-            RequestTerms::Call { deadline } => Some(deadline),
-            RequestTerms::Goal { .. } => None,
-        }
-    }
-
     fn keys(&self) -> impl Iterator<Item = RequestKey> + use<> {
         let clients = [
-            RequestKey::Caller(self.caller, self.kind()),
-            RequestKey::Provider(self.provider, self.kind()),
+            RequestKey::Caller(self.caller, self.kind),
+            RequestKey::Provider(self.provider, self.kind),
         ];
-        let deadline = self.deadline().map(RequestKey::Deadline);
+        let deadline = self.deadline.map(RequestKey::Deadline);
         clients.into_iter().chain(deadline)
     }
 }
 
 /// The requests, by their numbers.
 #[derive(Default)]
-pub(crate) struct Requests {
+pub(super) struct Requests {
     outstanding: BTreeMap<u64, Forwarded>,
     /// The numbers under each key.
     index: BTreeSet<(RequestKey, u64)>,
@@ -98,7 +82,7 @@ fn number_of(id: &Payload) -> Option<u64> {
 
 impl Requests {
     /// Adds a request. Returns its id at its provider.
-    pub(crate) fn add(&mut self, request: Forwarded) -> String {
+    pub(super) fn add(&mut self, request: Forwarded) -> String {
         self.made += 1;
         let number = self.made;
         self.index.extend(request.keys().map(|key| (key, number)));
@@ -121,15 +105,9 @@ impl Requests {
         range.map(|(_, number)| *number)
     }
 
-    /// Whether a call of `caller` has not ended.
-    pub(crate) fn has_waiting(&self, caller: ConnectionId) -> bool {
-        let key = RequestKey::Caller(caller, Served::Service);
-        self.numbers(key).next().is_some()
-    }
-
     /// The number of the request with this `id`, if `provider` serves it. Without an id, it is the only request that
     /// waits for `provider`, if its name is `name`.
-    pub(crate) fn meant(
+    pub(super) fn meant(
         &self,
         kind: Served,
         id: Option<&Payload>,
@@ -145,15 +123,15 @@ impl Requests {
         };
         let request = self.outstanding.get(&number)?;
         let is_late = request
-            .deadline()
+            .deadline
             .is_some_and(|deadline| Instant::now() > deadline);
         let is_meant = id.is_some() || name.is_none_or(|name| names::are_same(&request.name, name));
-        let is_theirs = request.provider == provider && request.kind() == kind;
+        let is_theirs = request.provider == provider && request.kind == kind;
         (is_theirs && is_meant && !is_late).then_some(number)
     }
 
     /// The newest goal of `caller` with this `id`, and its id at the provider.
-    pub(crate) fn goal_made_under(
+    pub(super) fn goal_made_under(
         &self,
         id: Option<&Payload>,
         name: &str,
@@ -167,12 +145,12 @@ impl Requests {
         Some((own_id(number), request))
     }
 
-    pub(crate) fn get(&self, number: u64) -> Option<&Forwarded> {
+    pub(super) fn get(&self, number: u64) -> Option<&Forwarded> {
         self.outstanding.get(&number)
     }
 
     /// Removes and returns a request.
-    pub(crate) fn take(&mut self, number: u64) -> Option<Forwarded> {
+    pub(super) fn take(&mut self, number: u64) -> Option<Forwarded> {
         let request = self.outstanding.remove(&number)?;
         for key in request.keys() {
             self.index.remove(&(key, number));
@@ -181,14 +159,14 @@ impl Requests {
     }
 
     /// Removes and returns every request, oldest first.
-    pub(crate) fn take_all(&mut self) -> Vec<Forwarded> {
+    pub(super) fn take_all(&mut self) -> Vec<Forwarded> {
         let numbers: Vec<u64> = self.outstanding.keys().copied().collect();
         let requests = numbers.into_iter().map(|number| self.take(number));
         requests.flatten().collect()
     }
 
     /// The earliest deadline.
-    pub(crate) fn next_deadline(&self) -> Option<Instant> {
+    pub(super) fn next_deadline(&self) -> Option<Instant> {
         match self.index.first()? {
             (RequestKey::Deadline(deadline), _) => Some(*deadline),
             _ => None,
@@ -196,21 +174,21 @@ impl Requests {
     }
 
     /// Removes and returns the request with the earliest deadline, if that has passed.
-    pub(crate) fn take_due(&mut self, now: Instant) -> Option<Forwarded> {
+    pub(super) fn take_due(&mut self, now: Instant) -> Option<Forwarded> {
         self.next_deadline().filter(|due| *due <= now)?;
         let (_, number) = *self.index.first()?;
         self.take(number)
     }
 
     /// The oldest request that waits for `provider`.
-    pub(crate) fn waiting_for(&self, provider: ConnectionId) -> Option<u64> {
+    pub(super) fn waiting_for(&self, provider: ConnectionId) -> Option<u64> {
         let of = |kind| RequestKey::Provider(provider, kind);
         let mut waiting = self.numbers_between(of(Served::Service), of(Served::Action));
         waiting.next()
     }
 
     /// Removes the requests of `caller`.
-    pub(crate) fn forget_caller(&mut self, caller: ConnectionId) {
+    pub(super) fn forget_caller(&mut self, caller: ConnectionId) {
         let of = |kind| RequestKey::Caller(caller, kind);
         let made = self.numbers_between(of(Served::Service), of(Served::Action));
         for number in made.collect::<Vec<u64>>() {

@@ -44,28 +44,3 @@ impl Drop for KeptEntry {
         self.sum.0.set(self.sum.0.get() - self.bytes);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_bounded_number_of_entries_fits_and_one_more_after_a_removal() {
-        let kept = Kept::default();
-        let mut entries = Vec::new();
-        let full = loop {
-            match kept.enter(10, None) {
-                Ok(entry) => entries.push(entry),
-                Err(why) => break why,
-            }
-        };
-        assert_eq!(full, Refusal::TooMuchKept);
-        assert_eq!(entries.len(), MAX_KEPT / (ENTRY_BYTES + 30));
-        assert!(kept.enter(10, entries.first()).is_ok());
-        entries.pop();
-        assert!(kept.enter(10, None).is_ok());
-        assert!(kept.enter(usize::MAX, None).is_err());
-        drop(entries);
-        assert_eq!(kept.0.get(), 0);
-    }
-}

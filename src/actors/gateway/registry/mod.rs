@@ -1,62 +1,51 @@
 //! The registry has every client, topic and service. It fans messages out to subscribers, and routes calls.
 //!
-//! This file has its state and handlers. `publish.rs`, `subscriptions.rs` and `requests.rs` have the rosbridge ops. The
-//! other files have its tables, which send nothing.
+//! This file has its state, its messages and their handlers. `topics.rs` and `requests.rs` have the rosbridge ops, with
+//! their tables.
 //!
 //! **Invariant:** a message is encoded once for any number of subscribers, and not at all without subscribers. A
-//! refused op changes nothing. It gets an error status, or the call's one response.
+//! refused op changes nothing. It gets an error status, or the call's one response. Messages of one sender take effect
+//! in the order sent: the registry has one mailbox, and so has each connection.
 
 mod directory;
 mod forms;
 mod forwarded;
 mod kept;
 mod places;
-mod publish;
 mod refusal;
 mod requests;
-mod subscriptions;
 mod topics;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
+use std::fmt::Display;
 use std::net::IpAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
 use tokio::sync::oneshot;
-use tokio::time::{Instant, sleep_until};
+use tokio::time::Instant;
 
 use self::directory::Directory;
 use self::forwarded::Requests;
 use self::kept::{Kept, KeptEntry};
 use self::places::Places;
-use self::refusal::Refusal;
-use self::topics::Topics;
-use super::messages::{
-    Connect, CountRefusal, Disconnect, FinishAll, Handled, Outlets, RefuseCalls, Refused, Request,
-    Retire, SetTap, TakeCensus, Tap, Tapped, ToClient,
-};
 use crate::actors::ConnectionId;
-use crate::actors::node::{Barrier, FrameKind, Interest, Respond};
+use crate::actors::node::{Barrier, Done, FrameKind, Respond, guard};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::{Permit, cover};
 pub use crate::actors::wire::Nodes;
+use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, ErrorForm, Level};
-use crate::protocol::names;
-use crate::protocol::op::{Op, ProviderOp, Served, Verbosity};
+use crate::protocol::op::{Encoding, GoalStatus, Incoming, Op, OpError, Served, Verbosity};
+use crate::protocol::outbox::Throttle;
+use crate::protocol::ros::rosapi::{Census, ListedTopic};
 use crate::protocol::wire::json::Payload;
 
-/// Calls and goals ended per cleanup, which takes a third of a millisecond.
-const ENDED_IN_A_ROW: usize = 128;
-
 // ---- state ----------------------------------------------------------------------------------------------------------
-
-/// The runtime's nodes. From the runtime, once, before any client is accepted.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct Attach(pub Nodes);
 
 /// The registry actor.
 #[derive(Default)]
@@ -99,12 +88,15 @@ struct Client {
     withdrawn: HashSet<Topic>,
     /// The lowest level of statuses that it gets.
     verbosity: Verbosity,
+    /// The form in which it gets the reason of a failed call.
+    error_form: ErrorForm,
     /// Dropped when the client disconnects.
     present: Arc<()>,
     /// Replaced when the client unsubscribes from the feedback of its goals, and dropped with the client.
     listening: Arc<()>,
-    /// Dropped once no call of this client waits. Set after the client has stopped sending.
-    answered: Option<oneshot::Sender<()>>,
+    /// The guard that its calls to other clients share, and the receiver that ends with them. Removed when the client
+    /// stops sending.
+    calls: Option<(Done, oneshot::Receiver<()>)>,
 }
 
 /// The registrations of one client, sorted by name. They are withdrawn in that order.
@@ -149,9 +141,10 @@ impl Client {
             registered: Registrations::default(),
             withdrawn: HashSet::new(),
             verbosity: Verbosity::ALL,
+            error_form: ErrorForm::default(),
             present: Arc::default(),
             listening: Arc::default(),
-            answered: None,
+            calls: Some(guard()),
         }
     }
 
@@ -174,18 +167,389 @@ impl Client {
             .do_send(ToClient::Deliver { topic, frame });
     }
 
-    /// Sets the form in which the client gets the reason of a failed call, if `form` is given.
-    fn set_error_form(&self, form: Option<ErrorForm>) {
-        if let Some(form) = form {
-            let wants_text = form == ErrorForm::Text;
-            self.outlets.wants_text.store(wants_text, Ordering::Relaxed);
-        }
-    }
-
     /// Bytes of responses that wait to be written to it.
     fn backlog(&self) -> usize {
         self.outlets.backlog.load(Ordering::Relaxed)
     }
+}
+
+// ---- the table of topics --------------------------------------------------------------------------------------------
+
+/// One `subscribe` of a connection to a topic. `id` distinguishes several of them.
+#[derive(Debug)]
+pub(super) struct Subscription {
+    pub(super) id: Option<Box<str>>,
+    pub(super) throttle: Duration,
+    pub(super) queue_length: usize,
+    pub(super) encoding: Encoding,
+    /// Its part of the client's limit [`MAX_KEPT`](crate::actors::gateway::limits::MAX_KEPT).
+    pub(super) entry: KeptEntry,
+}
+
+/// The topics, by their absolute names.
+#[derive(Default)]
+pub(super) struct Topics {
+    by_name: BTreeMap<Arc<str>, TopicUsers>,
+}
+
+/// Clients that use a topic.
+#[derive(Default)]
+struct TopicUsers {
+    publishers: usize,
+    subscribers: Vec<Subscriber>,
+    /// The first type that a client named.
+    type_name: Option<Arc<str>>,
+    /// The first known type that a client named. Messages are encoded by it.
+    known: Option<Type>,
+}
+
+/// A connection that subscribes to a topic under one spelling.
+pub(super) struct Subscriber {
+    pub(super) connection: ConnectionId,
+    /// Its spelling of the topic. Its messages have this name.
+    pub(super) spelling: Arc<str>,
+    pub(super) mailbox: Recipient<ToClient>,
+    /// The merged encoding of its subscriptions.
+    pub(super) encoding: Encoding,
+    subscriptions: Vec<Subscription>,
+}
+
+impl Subscriber {
+    pub(super) fn new(
+        connection: ConnectionId,
+        spelling: Arc<str>,
+        mailbox: Recipient<ToClient>,
+    ) -> Self {
+        Self {
+            connection,
+            spelling,
+            mailbox,
+            encoding: Encoding::default(),
+            subscriptions: Vec::new(),
+        }
+    }
+
+    /// The subscription with this `id`.
+    pub(super) fn subscription(&self, id: Option<&str>) -> Option<&Subscription> {
+        let mut all = self.subscriptions.iter();
+        all.find(|one| one.id.as_deref() == id)
+    }
+
+    /// Ends the subscriptions that `stays` rejects, and adds `new`, if there is one.
+    pub(super) fn change(
+        &mut self,
+        stays: impl FnMut(&Subscription) -> bool,
+        new: Option<Subscription>,
+    ) {
+        self.subscriptions.retain(stays);
+        self.subscriptions.extend(new);
+        let all = self.subscriptions.iter().map(|one| one.encoding);
+        self.encoding = all.reduce(Encoding::merged).unwrap_or_default();
+    }
+
+    /// The smallest of each value over its subscriptions. `None` if there are none.
+    pub(super) fn throttle(&self) -> Option<Throttle> {
+        let all = &self.subscriptions;
+        let queue_lengths = || all.iter().map(|one| one.queue_length);
+        Some(Throttle {
+            interval: all.iter().map(|one| one.throttle).min()?,
+            held_back: queue_lengths().min()?.max(1),
+            queue_length: queue_lengths().filter(|length| *length > 0).min(),
+        })
+    }
+
+    /// Sends the topic's throttle to the connection.
+    pub(super) fn configure(&self, throttle: Option<Throttle>) {
+        self.mailbox.do_send(ToClient::Configure {
+            topic: Arc::clone(&self.spelling),
+            throttle,
+        });
+    }
+}
+
+impl Topics {
+    /// A client has begun to advertise a topic.
+    pub(super) fn add_publisher(&mut self, topic: &str) {
+        self.by_name.entry(topic.into()).or_default().publishers += 1;
+    }
+
+    /// A client has begun to subscribe to a topic under a spelling.
+    pub(super) fn add_subscriber(&mut self, topic: &str, subscriber: Subscriber) {
+        let users = self.by_name.entry(topic.into()).or_default();
+        users.subscribers.push(subscriber);
+    }
+
+    /// A client that uses a topic has named its type. Returns whether it is the topic's first type.
+    pub(super) fn note_type(&mut self, topic: &str, type_name: &str) -> bool {
+        let Some(users) = self.by_name.get_mut(topic) else {
+            return false;
+        };
+        if users.known.is_none() {
+            users.known = types::find(type_name);
+        }
+        let is_first = users.type_name.is_none();
+        users.type_name.get_or_insert_with(|| type_name.into());
+        is_first
+    }
+
+    /// A client has stopped advertising a topic.
+    pub(super) fn remove_publisher(&mut self, topic: &str) {
+        self.remove(topic, |users| {
+            users.publishers = users.publishers.saturating_sub(1);
+        });
+    }
+
+    /// A client has stopped subscribing to a topic under this spelling.
+    pub(super) fn remove_subscriber(&mut self, topic: &str, spelling: &str, client: ConnectionId) {
+        self.remove(topic, |users| {
+            users
+                .subscribers
+                .retain(|one| one.connection != client || *one.spelling != *spelling);
+        });
+    }
+
+    fn remove(&mut self, topic: &str, change: impl FnOnce(&mut TopicUsers)) {
+        let Some(users) = self.by_name.get_mut(topic) else {
+            debug_assert!(false, "{topic} was not counted");
+            return;
+        };
+        change(users);
+        if users.publishers == 0 && users.subscribers.is_empty() {
+            self.by_name.remove(topic);
+        }
+    }
+
+    /// The subscribers to a topic, under all its spellings.
+    pub(super) fn subscribers(&self, topic: &str) -> &[Subscriber] {
+        let users = self.by_name.get(topic);
+        users.map_or(&[], |users| &users.subscribers)
+    }
+
+    /// The client that subscribes to a topic under this spelling.
+    pub(super) fn subscriber(
+        &mut self,
+        topic: &str,
+        spelling: &str,
+        client: ConnectionId,
+    ) -> Option<&mut Subscriber> {
+        let mut all = self.by_name.get_mut(topic)?.subscribers.iter_mut();
+        all.find(|one| one.connection == client && *one.spelling == *spelling)
+    }
+
+    /// The type of a topic, if a client has named a known type.
+    pub(super) fn known_type(&self, topic: &str) -> Option<Type> {
+        self.by_name.get(topic)?.known
+    }
+
+    /// The topics in the form of rosapi.
+    pub(super) fn listed(&self) -> impl Iterator<Item = ListedTopic> {
+        self.by_name.iter().map(|(name, users)| ListedTopic {
+            name: Arc::clone(name),
+            type_name: users.type_name.clone(),
+            published: users.publishers > 0,
+            subscribed: !users.subscribers.is_empty(),
+        })
+    }
+}
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// The runtime's nodes. From the runtime, once, before any client is accepted.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Attach(pub Nodes);
+
+/// A new client. From its connection. Returns its id.
+#[derive(Message)]
+#[rtype(result = "Result<ConnectionId, Refused>")]
+pub struct Connect {
+    /// The handles to its connection.
+    pub outlets: Outlets,
+    /// Its address.
+    pub from: IpAddr,
+    /// Whether it may use a kept place.
+    pub may_use_kept: bool,
+}
+
+/// A client was refused because no place was free. From its connection.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct CountRefusal;
+
+/// The handles to a connection, and the state that it shares with the registry.
+#[derive(Clone)]
+pub struct Outlets {
+    /// Its mailbox.
+    pub mailbox: Recipient<ToClient>,
+    /// Set when the client has disconnected. Heavy computations for it stop.
+    pub gone: Arc<AtomicBool>,
+    /// Bytes of responses that wait to be written. The connection updates the number.
+    pub backlog: Arc<AtomicUsize>,
+}
+
+/// Why a client was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Refused {
+    /// No place is free.
+    #[error(
+        "too many connections: this runtime serves {clients} clients at once and keeps {kept} of these places for HTTP \
+         and WebSocket; --clients sets the number"
+    )]
+    Full {
+        /// How many clients are served.
+        clients: usize,
+        /// How many of their places are kept.
+        kept: usize,
+    },
+    /// The runtime is ending.
+    #[error("shutting down")]
+    Closed,
+}
+
+/// The client has stopped sending. The registry withdraws its registrations. From its connection. The receiver, if
+/// there is one, ends when the client's calls have been answered.
+#[derive(Message)]
+#[rtype(result = "Handled")]
+pub struct Retire(pub ConnectionId);
+
+/// The client has disconnected. The registry withdraws its registrations. From its connection. Idempotent.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Disconnect(pub ConnectionId);
+
+/// One frame of a client. From its connection, which waits for [`Handled`] before it continues to read.
+#[derive(Message)]
+#[rtype(result = "Handled")]
+pub struct Request {
+    /// The client.
+    pub from: ConnectionId,
+    /// The op with the frame's `id`, or the frame's error.
+    pub incoming: Incoming,
+    /// The memory permit of a long frame. All forms made of the frame share it.
+    pub permit: Option<Permit>,
+}
+
+/// The op has been routed. A node or the subscribers' sockets may still have to process it. The receiver ends after
+/// that.
+#[derive(MessageResponse, Default)]
+pub struct Handled {
+    effect: Option<oneshot::Receiver<()>>,
+    /// Messages sent to subscribers.
+    deliveries: usize,
+}
+
+impl Handled {
+    /// The op has already taken effect.
+    #[must_use]
+    pub fn at_once() -> Self {
+        Self::default()
+    }
+
+    /// The op was sent to its provider, or the message to its subscribers.
+    #[must_use]
+    pub fn with(effect: oneshot::Receiver<()>) -> Self {
+        Self {
+            effect: Some(effect),
+            deliveries: 0,
+        }
+    }
+
+    /// The message was also sent to this many subscribers.
+    #[must_use]
+    pub fn delivered(self, deliveries: usize) -> Self {
+        Self { deliveries, ..self }
+    }
+
+    /// Waits until the op has taken effect. Returns how many messages were sent to subscribers.
+    pub async fn effect(self) -> usize {
+        if let Some(effect) = self.effect {
+            // The sender never sends: dropping it is the signal.
+            let _ = effect.await;
+        }
+        self.deliveries
+    }
+}
+
+/// Requests the topics and services of the clients. From `rosapi`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "Census")]
+pub struct TakeCensus;
+
+/// A message or call in the registry, as the tap gets it.
+pub enum Tapped<'a> {
+    /// A message of the runtime, as the whole `publish` frame.
+    Published(Topic, &'a Bytes),
+    /// A client's message on a topic to which the runtime subscribes.
+    NodeMessage(Topic, &'a Payload),
+    /// A client's call of one of the runtime's services.
+    Called {
+        /// The client.
+        from: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The caller's `id`, if there is one.
+        id: Option<&'a Payload>,
+        /// The arguments.
+        args: &'a Payload,
+    },
+    /// The response to such a call, as the whole frame.
+    Answered {
+        /// The client.
+        to: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The frame.
+        frame: &'a Bytes,
+    },
+}
+
+/// Gets every message and call of the runtime, on the registry's thread. It must not block.
+pub type Tap = Box<dyn FnMut(Tapped<'_>) + Send>;
+
+/// Sets or removes the tap. While a tap is set, every topic of the runtime counts as subscribed. From the recorder.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct SetTap(pub Option<Tap>);
+
+/// The registry rejects new calls, and the calls and goals that wait for clients, with this reason. From the runtime,
+/// when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct RefuseCalls(pub &'static str);
+
+/// Every connection sends its queue and ends. From the runtime, when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct FinishAll;
+
+/// The registry's messages to a connection, in one order.
+#[derive(Message, Clone)]
+#[rtype(result = "()")]
+pub enum ToClient {
+    /// A topic message, or a [series](crate::protocol::wire::series) of them. It may be dropped, oldest first, when the
+    /// client is slow.
+    Deliver {
+        /// The topic, for throttling. `None` for feedback of a goal.
+        topic: Option<Arc<str>>,
+        /// The message, shared by all subscribers of this form.
+        frame: Bytes,
+    },
+    /// A response, a status, or a call forwarded to this client as a provider. It is never dropped.
+    Respond {
+        /// The whole frame.
+        frame: Bytes,
+        /// The service that responds, if it is the runtime's own.
+        service: Option<Service>,
+    },
+    /// How a topic is throttled for this client.
+    Configure {
+        /// The topic.
+        topic: Arc<str>,
+        /// The smallest values of all subscriptions. `None` once it is not subscribed.
+        throttle: Option<Throttle>,
+    },
+    /// Send the queue, then end. The runtime is ending.
+    Finish,
 }
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
@@ -219,7 +583,8 @@ impl Handler<Connect> for Registry {
         }
         let taken = self.clients.len();
         if !self.places.has_room(taken, connect.may_use_kept) {
-            return Err(self.places.refusal());
+            let Places { clients, kept, .. } = self.places;
+            return Err(Refused::Full { clients, kept });
         }
         self.connections_made += 1;
         let id = ConnectionId(self.connections_made);
@@ -242,7 +607,7 @@ impl Handler<CountRefusal> for Registry {
             *held.entry(client.from).or_default() += 1;
         }
         if let Some((most_from, held)) = held.into_iter().max_by_key(|(_, held)| *held) {
-            let (places, taken) = (self.places.clients(), self.clients.len());
+            let (places, taken) = (self.places.clients, self.clients.len());
             tracing::warn!(
                 places,
                 taken,
@@ -261,14 +626,9 @@ impl Handler<Retire> for Registry {
     fn handle(&mut self, Retire(id): Retire, ctx: &mut Context<Self>) -> Handled {
         self.withdraw(id);
         self.schedule_cleanup(ctx);
-        if !self.requests.has_waiting(id) {
-            return Handled::at_once();
-        }
-        let (answered, all_answered) = oneshot::channel();
-        if let Some(client) = self.clients.get_mut(&id) {
-            client.answered = Some(answered);
-        }
-        Handled::with(all_answered)
+        let client = self.clients.get_mut(&id);
+        let calls = client.and_then(|client| client.calls.take());
+        calls.map_or_else(Handled::at_once, |(_, all_ended)| Handled::with(all_ended))
     }
 }
 
@@ -289,12 +649,21 @@ impl Handler<Disconnect> for Registry {
 impl Handler<Request> for Registry {
     type Result = Handled;
 
-    fn handle(&mut self, mut request: Request, ctx: &mut Context<Self>) -> Handled {
-        if !self.clients.contains_key(&request.from) {
+    fn handle(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
+        let Request { from, incoming, .. } = request;
+        if !self.clients.contains_key(&from) {
             return Handled::at_once();
         }
-        self.permit = request.permit.take();
-        let handled = self.perform(request, ctx);
+        let Incoming { id, op } = incoming;
+        let origin = FrameOrigin { from, id };
+        self.permit = request.permit;
+        let handled = match op {
+            Ok(op) => self.perform(origin, op, ctx),
+            Err(why) => {
+                self.answer_error(&origin, &why);
+                Handled::at_once()
+            }
+        };
         self.permit = None;
         handled
     }
@@ -333,45 +702,6 @@ impl Handler<TakeCensus> for Registry {
     }
 }
 
-impl Handler<SetTap> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, SetTap(tap): SetTap, _: &mut Context<Self>) {
-        let unwanted: Vec<&str> = Topic::ALL
-            .map(Topic::name)
-            .into_iter()
-            .filter(|topic| self.topics.subscribers(topic).is_empty())
-            .collect();
-        let was_set = self.tap.is_some();
-        self.tap = tap;
-        for topic in unwanted {
-            match (was_set, self.tap.is_some()) {
-                (_, true) => self.tell_owner(topic, true),
-                (true, false) => self.note_unwanted(topic),
-                (false, false) => {}
-            }
-        }
-        for (topic, frame) in &self.latched {
-            if let Some(tap) = &mut self.tap
-                && !self.topics.subscribers(topic.name()).is_empty()
-            {
-                tap(Tapped::Published(*topic, frame));
-            }
-        }
-    }
-}
-
-impl Handler<RefuseCalls> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, RefuseCalls(why): RefuseCalls, _: &mut Context<Self>) {
-        self.closed = Some(why);
-        for request in self.requests.take_all() {
-            self.fail(&request, &Refusal::Closed(why));
-        }
-    }
-}
-
 impl Handler<FinishAll> for Registry {
     type Result = ();
 
@@ -389,12 +719,10 @@ impl Handler<FinishAll> for Registry {
 
 impl Registry {
     /// Performs one op of a registered client.
-    fn perform(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
-        let Request { from, id, op, .. } = request;
-        let origin = FrameOrigin { from, id };
+    fn perform(&mut self, origin: FrameOrigin, op: Op, ctx: &mut Context<Self>) -> Handled {
         let refusal = match op {
             Op::Publish { topic, msg } => return self.publish(origin, &topic, msg, ctx),
-            Op::PublishLines(lines) => return self.publish_lines(from, &lines, ctx),
+            Op::PublishLines(lines) => return self.publish_lines(origin.from, &lines, ctx),
             Op::CallService(call) => return self.call(origin, call, ctx),
             Op::SendActionGoal(goal) => return self.send_action_goal(origin, goal, ctx),
             Op::CancelActionGoal { action } => {
@@ -413,9 +741,9 @@ impl Registry {
                 Ok(())
             }
             Op::SetLevel { verbosity, errors } => {
-                if let Some(client) = self.clients.get_mut(&from) {
+                if let Some(client) = self.clients.get_mut(&origin.from) {
                     client.verbosity = verbosity;
-                    client.set_error_form(errors);
+                    client.error_form = errors.unwrap_or(client.error_form);
                 }
                 Ok(())
             }
@@ -435,168 +763,34 @@ impl Registry {
         Handled::at_once()
     }
 
-    /// Performs an op of a client that serves `name`.
-    fn perform_as_provider(
-        &mut self,
-        origin: &FrameOrigin,
-        kind: Served,
-        name: &str,
-        op: ProviderOp,
-    ) -> Result<(), Refusal> {
-        match op {
-            ProviderOp::Advertise { type_name } => {
-                self.serve(origin, kind, name, type_name.as_deref())
+    /// Answers a frame that has no op: by the response of its call, by the result of its goal, or by a status.
+    fn answer_error(&self, origin: &FrameOrigin, why: &OpError) {
+        match why {
+            OpError::Call { service, problem } => self.refuse_call(origin, service, problem, None),
+            OpError::Goal { action, problem } => {
+                self.end_goal(origin, action, problem, GoalStatus::Unknown);
             }
-            ProviderOp::Unadvertise => self.stop_serving(origin, kind, name),
-            ProviderOp::Feedback { values } => self.pass_feedback(origin, name, &values),
-            ProviderOp::End {
-                values,
-                status,
-                result,
-            } => self.complete(origin, kind, name, |name, id| {
-                messages::action_result(name, id, &values, status, result)
-            }),
-            ProviderOp::Respond {
-                values,
-                result,
-                status,
-            } => {
-                let status = status.unwrap_or_default();
-                self.complete(origin, kind, name, |name, id| {
-                    messages::response(name, id, &values, result, &status)
-                })
-            }
+            OpError::Status(problem) => self.refuse(origin, problem),
         }
     }
 
     /// Sends an error status with the reason to the sender of a refused frame.
-    fn refuse(&self, origin: &FrameOrigin, why: &Refusal) {
-        self.send_status(
-            origin.from,
-            Level::Error,
-            &why.to_string(),
-            origin.id.as_ref(),
-        );
+    fn refuse(&self, origin: &FrameOrigin, why: &impl Display) {
+        let why = why.to_string();
+        tracing::debug!(connection = origin.from.0, why, "refused");
+        self.send_status(origin, Level::Error, &why);
     }
 
-    fn send_status(&self, to: ConnectionId, level: Level, msg: &str, id: Option<&Payload>) {
-        if level == Level::Error {
-            tracing::debug!(connection = to.0, why = msg, "refused");
-        }
-        if let Some(client) = self.clients.get(&to)
+    fn send_status(&self, origin: &FrameOrigin, level: Level, msg: &str) {
+        if let Some(client) = self.clients.get(&origin.from)
             && client.verbosity.wants(level)
         {
-            client.send(messages::status(level, msg, id));
+            client.send(self.covered(messages::status(level, msg, origin.id.as_ref())));
         }
     }
 
     /// The frame with the memory permit of the long frame from which it was made.
     fn covered(&self, frame: Bytes) -> Bytes {
         cover(self.permit.as_ref(), frame)
-    }
-
-    /// Whether the topic has a subscriber or a tap. `topic` is an absolute name.
-    fn is_wanted(&self, topic: &str) -> bool {
-        self.tap.is_some() || !self.topics.subscribers(topic).is_empty()
-    }
-
-    /// Notes that the topic's last subscriber has gone.
-    fn note_unwanted(&mut self, topic: &str) {
-        if let Some(topic) = Topic::from_name(topic) {
-            self.latched.remove(&topic);
-        }
-        self.tell_owner(topic, false);
-    }
-
-    fn tell_owner(&self, topic: &str, wanted: bool) {
-        if let Some(topic) = Topic::from_name(topic)
-            && let Some(owner) = self.nodes.publishers.get(&topic)
-        {
-            owner.do_send(Interest { topic, wanted });
-        }
-    }
-}
-
-// ---- cleanup: calls and goals end in batches, and other messages are handled in between -----------------------------
-
-impl Registry {
-    /// Withdraws a client's registrations. The cleanup ends the calls and goals that wait for its answer, because there
-    /// may be many.
-    fn withdraw(&mut self, id: ConnectionId) {
-        let Some(client) = self.clients.get_mut(&id) else {
-            return;
-        };
-        let registered = std::mem::take(&mut client.registered);
-        for topic in registered.advertised.keys() {
-            self.topics.remove_publisher(topic);
-        }
-        for topic in &registered.subscribed {
-            self.drop_subscriber(topic, id);
-        }
-        for (kind, name) in registered.served.keys() {
-            self.directory.withdraw(*kind, name, id);
-        }
-        if self.requests.waiting_for(id).is_some() {
-            self.gone.push_back(id);
-        }
-    }
-
-    /// Schedules the next cleanup: at once if a provider has disconnected, else at the earliest deadline.
-    fn schedule_cleanup(&mut self, ctx: &mut Context<Self>) {
-        let left = (!self.gone.is_empty()).then(Instant::now);
-        let Some(due) = left.or_else(|| self.requests.next_deadline()) else {
-            return;
-        };
-        if let Some((at, waiting)) = self.next_cleanup {
-            if at <= due {
-                return;
-            }
-            ctx.cancel_future(waiting);
-        }
-        let wait = async move {
-            tokio::task::yield_now().await;
-            sleep_until(due).await;
-        };
-        let waiting = ctx.spawn(wait.into_actor(self).map(|(), registry, ctx| {
-            registry.next_cleanup = None;
-            registry.clean_up_batch();
-            registry.schedule_cleanup(ctx);
-        }));
-        self.next_cleanup = Some((due, waiting));
-    }
-
-    /// Ends one batch: first calls past their deadlines, then requests of disconnected providers.
-    fn clean_up_batch(&mut self) {
-        let now = Instant::now();
-        for _ in 0..ENDED_IN_A_ROW {
-            if let Some(call) = self.requests.take_due(now) {
-                self.fail(&call, &Refusal::TimedOut(call.name.to_string()));
-                continue;
-            }
-            let Some(provider) = self.gone.front() else {
-                return;
-            };
-            let waiting = self.requests.waiting_for(*provider);
-            if let Some(request) = waiting.and_then(|number| self.requests.take(number)) {
-                self.fail(&request, &Refusal::ProviderGone(request.name.to_string()));
-            } else {
-                self.gone.pop_front();
-            }
-        }
-    }
-
-    /// Removes a subscriber from a topic, and notifies the topic's owner if it was the last one.
-    fn drop_subscriber(&mut self, topic: &str, connection: ConnectionId) {
-        let name = names::absolute(topic);
-        self.topics.remove_subscriber(&name, topic, connection);
-        if let Some(client) = self.clients.get_mut(&connection)
-            && Topic::from_name(&name) == Some(Topic::TfWebFeedback)
-            && !names::spellings(&name).any(|one| client.registered.subscribed.contains(one))
-        {
-            client.listening = Arc::default();
-        }
-        if !self.is_wanted(&name) {
-            self.note_unwanted(&name);
-        }
     }
 }

@@ -7,7 +7,6 @@ use std::time::Duration;
 use tokio::time::Instant;
 
 use crate::actors::gateway::limits::KEPT_PLACES;
-use crate::actors::gateway::messages::Refused;
 use crate::options::DEFAULT_CLIENTS;
 
 /// Shortest time between two warnings.
@@ -16,8 +15,10 @@ const WARNING_INTERVAL: Duration = Duration::from_secs(60);
 /// The places, and the refusals since the last warning.
 #[derive(Debug)]
 pub(crate) struct Places {
-    clients: usize,
-    kept: usize,
+    /// The number of places.
+    pub(crate) clients: usize,
+    /// The number of kept places.
+    pub(crate) kept: usize,
     refused: u64,
     warned: Option<Instant>,
 }
@@ -40,23 +41,10 @@ impl Places {
         }
     }
 
-    /// The number of places.
-    pub(crate) const fn clients(&self) -> usize {
-        self.clients
-    }
-
     /// Whether there is a place for one more client when `taken` places are in use.
     pub(crate) const fn has_room(&self, taken: usize, may_use_kept: bool) -> bool {
         let kept = if may_use_kept { 0 } else { self.kept };
         taken + kept < self.clients
-    }
-
-    /// The refusal of a client without a place.
-    pub(crate) const fn refusal(&self) -> Refused {
-        Refused::Full {
-            clients: self.clients,
-            kept: self.kept,
-        }
     }
 
     /// Counts a refusal. Returns the number of refusals since the last warning, if the next warning is due.

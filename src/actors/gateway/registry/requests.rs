@@ -2,18 +2,18 @@
 //!
 //! **Invariant:** every call has one response. Every goal has one `action_result`, unless its sender disconnects first.
 
+use std::fmt::Display;
 use std::sync::Arc;
 
 use actix::prelude::*;
 use bytes::Bytes;
-use tokio::time::Instant;
+use tokio::time::{Instant, sleep_until};
 
-use super::forwarded::{Forwarded, RequestTerms};
+use super::forwarded::Forwarded;
 use super::refusal::Refusal;
-use super::{FrameOrigin, Registry};
+use super::{FrameOrigin, Handled, RefuseCalls, Registry, Tapped};
 use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
-use crate::actors::gateway::messages::{Handled, Tapped};
-use crate::actors::node::guard;
+use crate::actors::node::{Done, guard};
 use crate::actors::resources::memory::cover_message;
 use crate::actors::wire::action_client::{
     ActionClient, ActionRequest, CancelSent, ForwardGoal, SentGoal,
@@ -22,9 +22,14 @@ use crate::actors::wire::{Caller, Route, ServiceCall};
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
-use crate::protocol::op::{ActionGoal, Arguments, CallService, GoalStatus, Problem, Served};
+use crate::protocol::op::{
+    ActionGoal, Arguments, CallService, GoalStatus, Problem, ProviderOp, Served,
+};
 use crate::protocol::wire::json::Payload;
 use crate::services::{Address, NoService};
+
+/// Calls and goals ended per cleanup, which takes a third of a millisecond.
+const ENDED_IN_A_ROW: usize = 128;
 
 // ---- to the runtime's own nodes -------------------------------------------------------------------------------------
 
@@ -53,7 +58,7 @@ impl Registry {
                         });
                     }
                     let address = Address::new(service, call.service.into_boxed_str(), origin.id)
-                        .with_errors(client.outlets.error_form());
+                        .with_errors(client.error_form);
                     let (caller, ended) = Caller::new(
                         ctx.address().recipient(),
                         origin.from,
@@ -73,82 +78,67 @@ impl Registry {
             }
         } else {
             let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
-            let terms = |_: &str| RequestTerms::Call { deadline };
-            let encode =
-                |spelling: &str, id: &str| messages::call(spelling, id, call.args.payload());
+            let args = call.args.payload();
+            let encode = |spelling: &str, id: &str| messages::call(spelling, id, args);
+            let name = (&*call.service, &call.args);
             self.forward(
                 &origin,
                 Served::Service,
-                (&call.service, &call.args),
-                terms,
+                name,
+                (Some(deadline), false),
                 encode,
             )
         };
         self.schedule_cleanup(ctx);
         if let Err(why) = refusal {
-            self.refuse_call(&origin, &call.service, &why);
+            let own = Service::from_name(&call.service);
+            self.refuse_call(&origin, &call.service, &why, own);
         }
         Handled::at_once()
     }
 
-    /// Sends a goal to the node, or the client, that serves its action.
+    /// Sends a goal to the node, or the client, that serves its action. A failure is the goal's one result.
     pub(super) fn send_action_goal(
         &mut self,
         origin: FrameOrigin,
         goal: ActionGoal,
         ctx: &mut Context<Self>,
     ) -> Handled {
-        let route = if let Some(why) = self.closed {
-            Err(Refusal::Closed(why))
-        } else if Action::from_name(&goal.action).is_some() {
-            self.action_route(&goal)
-        } else {
-            let terms = |spelling: &str| RequestTerms::Goal {
-                spelling: spelling.into(),
-                wants_feedback: goal.feedback,
-            };
-            let type_name = goal.type_name.as_deref();
-            let args = goal.args.payload();
-            let encode = |spelling: &str, id: &str| {
-                messages::action_goal(spelling, id, type_name, args, goal.feedback)
-            };
-            match self.forward(
-                &origin,
-                Served::Action,
-                (&goal.action, &goal.args),
-                terms,
-                encode,
-            ) {
-                Ok(()) => return Handled::at_once(),
-                Err(why) => Err(why),
-            }
-        };
         let Some(client) = self.clients.get(&origin.from) else {
             return Handled::at_once();
         };
-        let action_client = ActionClient {
-            respond: ctx.address().recipient(),
-            connection: origin.from,
-            action: Arc::from(goal.action.as_str()),
-            id: origin.id,
-            wants_feedback: goal.feedback,
-            gone: Arc::clone(&client.outlets.gone),
+        let refusal = if let Some(why) = self.closed {
+            Err(Refusal::Closed(why))
+        } else if Action::from_name(&goal.action).is_some() {
+            match self.action_route(&goal) {
+                Ok(node) => {
+                    let (done, ended) = guard();
+                    let client = ActionClient {
+                        respond: ctx.address().recipient(),
+                        connection: origin.from,
+                        action: Arc::from(goal.action),
+                        id: origin.id,
+                        wants_feedback: goal.feedback,
+                        gone: Arc::clone(&client.outlets.gone),
+                    };
+                    let goal = goal.args;
+                    node(ActionRequest::Goal(ForwardGoal { goal, client, done }));
+                    return Handled::with(ended);
+                }
+                Err(why) => Err(why),
+            }
+        } else {
+            let (type_name, args) = (goal.type_name.as_deref(), goal.args.payload());
+            let encode = |spelling: &str, id: &str| {
+                messages::action_goal(spelling, id, type_name, args, goal.feedback)
+            };
+            let name = (&*goal.action, &goal.args);
+            self.forward(&origin, Served::Action, name, (None, goal.feedback), encode)
         };
-        match route {
-            Ok(node) => {
-                let (done, ended) = guard();
-                node(ActionRequest::Goal(ForwardGoal {
-                    goal: goal.args,
-                    client: action_client,
-                    done,
-                }));
-                Handled::with(ended)
-            }
-            Err(why) => {
-                action_client.refuse(&why.to_string());
-                Handled::at_once()
-            }
+        if let Err(why) = refusal {
+            self.end_goal(&origin, &goal.action, &why, GoalStatus::Unknown);
         }
+        Handled::at_once()
     }
 
     fn action_route(&self, goal: &ActionGoal) -> Result<&Route<ActionRequest>, Refusal> {
@@ -192,6 +182,40 @@ impl Registry {
 // ---- to clients that serve ------------------------------------------------------------------------------------------
 
 impl Registry {
+    /// Performs an op of a client that serves `name`.
+    pub(super) fn perform_as_provider(
+        &mut self,
+        origin: &FrameOrigin,
+        kind: Served,
+        name: &str,
+        op: ProviderOp,
+    ) -> Result<(), Refusal> {
+        match op {
+            ProviderOp::Advertise { type_name } => {
+                self.serve(origin, kind, name, type_name.as_deref())
+            }
+            ProviderOp::Unadvertise => self.stop_serving(origin, kind, name),
+            ProviderOp::Feedback { values } => self.pass_feedback(origin, name, &values),
+            ProviderOp::End {
+                values,
+                status,
+                result,
+            } => self.complete(origin, kind, name, |name, id| {
+                messages::action_result(name, id, &values, status, result)
+            }),
+            ProviderOp::Respond {
+                values,
+                result,
+                status,
+            } => {
+                let status = status.unwrap_or_default();
+                self.complete(origin, kind, name, |name, id| {
+                    messages::response(name, id, &values, result, &status)
+                })
+            }
+        }
+    }
+
     /// Makes a client the provider of a service, or the server of an action.
     pub(super) fn serve(
         &mut self,
@@ -223,7 +247,7 @@ impl Registry {
             before.registered.served.remove(&(kind, name.into()));
         }
         let msg = format!("advertised {} {spelling}", kind.noun());
-        self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
+        self.send_status(origin, Level::Info, &msg);
         Ok(())
     }
 
@@ -251,7 +275,7 @@ impl Registry {
         origin: &FrameOrigin,
         kind: Served,
         (name, args): (&str, &Arguments),
-        terms: impl FnOnce(&str) -> RequestTerms,
+        (deadline, wants_feedback): (Option<Instant>, bool),
         encode: impl FnOnce(&str, &str) -> Bytes,
     ) -> Result<(), Refusal> {
         let absolute = &*names::absolute(name);
@@ -271,20 +295,26 @@ impl Registry {
         let Some(caller) = self.clients.get(&origin.from) else {
             return Ok(());
         };
-        let terms = terms(&provider.spelling);
-        let spelling = match &terms {
-            RequestTerms::Call { .. } => 0,
-            RequestTerms::Goal { spelling, .. } => spelling.len(),
+        let (spelling, done) = match kind {
+            Served::Service => (
+                None,
+                caller.calls.as_ref().map(|(done, _)| Done::clone(done)),
+            ),
+            Served::Action => (Some(provider.spelling.clone()), None),
         };
         let id = origin.id.as_ref().map_or(0, Payload::allocated);
-        let entry = caller.kept.enter(id + name.len() + spelling, None)?;
+        let bytes = id + name.len() + spelling.as_deref().map_or(0, str::len);
         let known_as = self.requests.add(Forwarded {
             caller: origin.from,
             id: origin.id.clone(),
             provider: provider.connection,
             name: name.into(),
-            terms,
-            _entry: entry,
+            kind,
+            deadline,
+            spelling,
+            wants_feedback,
+            _done: done,
+            _entry: caller.kept.enter(bytes, None)?,
         });
         if let Some(client) = self.clients.get(&provider.connection) {
             client.send(self.covered(encode(&provider.spelling, &known_as)));
@@ -303,9 +333,7 @@ impl Registry {
                 None => Refusal::NoAction(action.to_owned()),
             });
         };
-        if let (Some(server), RequestTerms::Goal { spelling, .. }) =
-            (self.clients.get(&goal.provider), &goal.terms)
-        {
+        if let (Some(server), Some(spelling)) = (self.clients.get(&goal.provider), &goal.spelling) {
             if server.backlog() > MAX_BACKLOG {
                 return Err(Refusal::ProviderBusy(action.to_owned()));
             }
@@ -328,9 +356,8 @@ impl Registry {
         if !names::are_same(&goal.name, action) {
             return Err(Refusal::OfAnother(Served::Action, goal.name.to_string()));
         }
-        let is_wanted =
-            matches!(goal.terms, RequestTerms::Goal { wants_feedback, .. } if wants_feedback);
-        if let Some(sender) = self.clients.get(&goal.caller).filter(|_| is_wanted) {
+        let sender = self.clients.get(&goal.caller);
+        if let Some(sender) = sender.filter(|_| goal.wants_feedback) {
             let frame = messages::action_feedback(&goal.name, goal.id.as_ref(), values);
             sender.deliver_feedback(cover_message(self.permit.as_ref(), frame));
         }
@@ -361,7 +388,6 @@ impl Registry {
             return Ok(());
         }
         caller.send(self.covered(encode(&request.name, request.id.as_ref())));
-        self.note_answered(&request);
         Ok(())
     }
 
@@ -399,44 +425,105 @@ impl Registry {
     }
 
     /// Ends a request without an answer. The caller gets the reason.
-    pub(super) fn fail(&mut self, request: &Forwarded, why: &Refusal) {
-        let Forwarded {
-            caller, id, name, ..
-        } = request;
-        match request.terms {
-            RequestTerms::Call { .. } => {
-                let origin = FrameOrigin {
-                    from: *caller,
-                    id: id.clone(),
-                };
-                self.refuse_call(&origin, name, why);
+    pub(super) fn fail(&self, request: &Forwarded, why: &Refusal) {
+        let origin = FrameOrigin {
+            from: request.caller,
+            id: request.id.clone(),
+        };
+        match request.kind {
+            Served::Service => self.refuse_call(&origin, &request.name, why, None),
+            Served::Action => {
+                self.end_goal(&origin, &request.name, why, GoalStatus::Aborted);
             }
-            RequestTerms::Goal { .. } => {
-                if let Some(sender) = self.clients.get(caller) {
-                    let (id, why) = (id.as_ref(), why.to_string());
-                    let status = GoalStatus::Aborted as u8;
-                    sender.send(messages::action_result(name, id, &why, status, false));
-                }
-            }
-        }
-        self.note_answered(request);
-    }
-
-    /// After the caller's last call, a caller that has stopped sending may be disconnected.
-    fn note_answered(&mut self, request: &Forwarded) {
-        if !self.requests.has_waiting(request.caller)
-            && let Some(client) = self.clients.get_mut(&request.caller)
-        {
-            client.answered = None;
         }
     }
 
-    /// Answers a call with `result: false` and the reason.
-    fn refuse_call(&self, origin: &FrameOrigin, service: &str, why: &Refusal) {
+    /// Answers a call with `result: false` and the reason. `own` is the service, if a node of the runtime serves it.
+    pub(super) fn refuse_call(
+        &self,
+        origin: &FrameOrigin,
+        service: &str,
+        why: &impl Display,
+        own: Option<Service>,
+    ) {
         if let Some(client) = self.clients.get(&origin.from) {
-            let (id, form) = (origin.id.as_ref(), client.outlets.error_form());
+            let (id, form) = (origin.id.as_ref(), client.error_form);
             let frame = messages::failure(service, id, &why.to_string(), form);
-            client.respond(frame, Service::from_name(service));
+            client.respond(self.covered(frame), own);
+        }
+    }
+
+    /// Ends a goal that has no result, for this reason.
+    pub(super) fn end_goal(
+        &self,
+        origin: &FrameOrigin,
+        action: &str,
+        why: &impl Display,
+        status: GoalStatus,
+    ) {
+        if let Some(client) = self.clients.get(&origin.from) {
+            let (id, why) = (origin.id.as_ref(), why.to_string());
+            let frame = messages::action_result(action, id, &why, status as u8, false);
+            client.send(self.covered(frame));
+        }
+    }
+}
+
+// ---- cleanup: requests end in batches, and other messages are handled in between ------------------------------------
+
+impl Registry {
+    /// Schedules the next cleanup: at once if a provider has disconnected, else at the earliest deadline.
+    pub(super) fn schedule_cleanup(&mut self, ctx: &mut Context<Self>) {
+        let left = (!self.gone.is_empty()).then(Instant::now);
+        let Some(due) = left.or_else(|| self.requests.next_deadline()) else {
+            return;
+        };
+        if let Some((at, waiting)) = self.next_cleanup {
+            if at <= due {
+                return;
+            }
+            ctx.cancel_future(waiting);
+        }
+        let wait = async move {
+            tokio::task::yield_now().await;
+            sleep_until(due).await;
+        };
+        let waiting = ctx.spawn(wait.into_actor(self).map(|(), registry, ctx| {
+            registry.next_cleanup = None;
+            registry.clean_up_batch();
+            registry.schedule_cleanup(ctx);
+        }));
+        self.next_cleanup = Some((due, waiting));
+    }
+
+    /// Ends one batch: first calls past their deadlines, then requests of disconnected providers.
+    fn clean_up_batch(&mut self) {
+        let now = Instant::now();
+        for _ in 0..ENDED_IN_A_ROW {
+            if let Some(call) = self.requests.take_due(now) {
+                self.fail(&call, &Refusal::TimedOut(call.name.to_string()));
+                continue;
+            }
+            let Some(provider) = self.gone.front() else {
+                return;
+            };
+            let waiting = self.requests.waiting_for(*provider);
+            if let Some(request) = waiting.and_then(|number| self.requests.take(number)) {
+                self.fail(&request, &Refusal::ProviderGone(request.name.to_string()));
+            } else {
+                self.gone.pop_front();
+            }
+        }
+    }
+}
+
+impl Handler<RefuseCalls> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, RefuseCalls(why): RefuseCalls, _: &mut Context<Self>) {
+        self.closed = Some(why);
+        for request in self.requests.take_all() {
+            self.fail(&request, &Refusal::Closed(why));
         }
     }
 }

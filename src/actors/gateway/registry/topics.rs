@@ -1,203 +1,506 @@
-//! The registry's table of topics: the publishers, subscribers and type of each.
+//! The topics of clients: advertisements, subscriptions and published messages, and the table of topics with the
+//! publishers, subscribers and type of each. A message is encoded once for each spelling of its topic and each requested
+//! encoding, and is delivered to every subscriber.
 //!
-//! **Invariant:** the table has a topic exactly as long as a client uses it. Each spelling of a topic has a connection
-//! at most once, for any number of subscriptions.
+//! **Invariant:** a refused op changes nothing. Without subscribers nothing is encoded. Subscribers that requested the
+//! same encoding share the same bytes. A long message delays only its publisher. The table has a topic exactly as long
+//! as a client uses it. Each spelling of a topic has a connection at most once, for any number of subscriptions.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
 
 use actix::prelude::*;
+use bytes::Bytes;
 
-use super::kept::KeptEntry;
+use super::forms::{Made, ToEncode};
+use super::refusal::Refusal;
+use super::{FrameOrigin, Handled, Registry, SetTap, Subscriber, Subscription, Tapped, ToClient};
 use crate::actors::ConnectionId;
-use crate::actors::gateway::messages::ToClient;
-use crate::protocol::catalog::types::{self, Type};
-use crate::protocol::op::Encoding;
+use crate::actors::node::{Done, Interest, Publish, guard};
+use crate::actors::resources::long_work::{WorkKind, run_long_work};
+use crate::actors::resources::memory::cover_message;
+use crate::actors::wire::TopicMessage;
+use crate::protocol::catalog::types;
+use crate::protocol::catalog::{Direction, Topic};
+use crate::protocol::limits::MAX_NAME;
+use crate::protocol::messages::{self, Level};
+use crate::protocol::names;
+use crate::protocol::op::{Compression, Encoding, Subscribe};
 use crate::protocol::outbox::Throttle;
-use crate::protocol::ros::rosapi::ListedTopic;
+use crate::protocol::ros::stamps::is_ros1_name;
+use crate::protocol::wire::json::Payload;
+use crate::protocol::wire::series::Series;
 
-/// One `subscribe` of a connection to a topic. `id` distinguishes several of them.
-#[derive(Debug)]
-pub(crate) struct Subscription {
-    pub(crate) id: Option<Box<str>>,
-    pub(crate) throttle: Duration,
-    pub(crate) queue_length: usize,
-    pub(crate) encoding: Encoding,
-    /// Its part of the client's limit [`MAX_KEPT`](crate::actors::gateway::limits::MAX_KEPT).
-    pub(crate) entry: KeptEntry,
-}
+// ---- advertisements and subscriptions ------------------------------------------------------------------------------
 
-/// The topics, by their absolute names.
-#[derive(Default)]
-pub(crate) struct Topics {
-    by_name: BTreeMap<Arc<str>, TopicUsers>,
-}
-
-/// Clients that use a topic.
-#[derive(Default)]
-struct TopicUsers {
-    publishers: usize,
-    subscribers: Vec<Subscriber>,
-    /// The first type that a client named.
-    type_name: Option<Arc<str>>,
-    /// The first known type that a client named. Messages are encoded by it.
-    known: Option<Type>,
-}
-
-/// A connection that subscribes to a topic under one spelling.
-pub(crate) struct Subscriber {
-    pub(crate) connection: ConnectionId,
-    /// Its spelling of the topic. Its messages have this name.
-    pub(crate) spelling: Arc<str>,
-    pub(crate) mailbox: Recipient<ToClient>,
-    /// The merged encoding of its subscriptions.
-    pub(crate) encoding: Encoding,
-    subscriptions: Vec<Subscription>,
-}
-
-impl Subscriber {
-    pub(crate) fn new(
-        connection: ConnectionId,
-        spelling: Arc<str>,
-        mailbox: Recipient<ToClient>,
-        first: Subscription,
-    ) -> Self {
-        Self {
-            connection,
-            spelling,
-            mailbox,
-            encoding: first.encoding,
-            subscriptions: vec![first],
-        }
-    }
-
-    /// The subscription with this `id`.
-    pub(crate) fn subscription(&self, id: Option<&str>) -> Option<&Subscription> {
-        let mut all = self.subscriptions.iter();
-        all.find(|one| one.id.as_deref() == id)
-    }
-
-    /// Ends the subscriptions that `stays` rejects, and adds `new`, if there is one.
-    pub(crate) fn change(
+impl Registry {
+    pub(super) fn advertise(
         &mut self,
-        stays: impl FnMut(&Subscription) -> bool,
-        new: Option<Subscription>,
-    ) {
-        self.subscriptions.retain(stays);
-        self.subscriptions.extend(new);
-        let all = self.subscriptions.iter().map(|one| one.encoding);
-        self.encoding = all.reduce(Encoding::merged).unwrap_or_default();
-    }
-
-    /// The smallest of each value over its subscriptions. `None` if there are none.
-    pub(crate) fn throttle(&self) -> Option<Throttle> {
-        let all = &self.subscriptions;
-        let queue_lengths = || all.iter().map(|one| one.queue_length);
-        Some(Throttle {
-            interval: all.iter().map(|one| one.throttle).min()?,
-            held_back: queue_lengths().min()?.max(1),
-            queue_length: queue_lengths().filter(|length| *length > 0).min(),
-        })
-    }
-
-    /// Sends the topic's throttle to the connection.
-    pub(crate) fn configure(&self, throttle: Option<Throttle>) {
-        self.mailbox.do_send(ToClient::Configure {
-            topic: Arc::clone(&self.spelling),
-            throttle,
-        });
-    }
-}
-
-impl Topics {
-    /// A client has begun to advertise a topic.
-    pub(crate) fn add_publisher(&mut self, topic: &str) {
-        self.by_name.entry(topic.into()).or_default().publishers += 1;
-    }
-
-    /// A client has begun to subscribe to a topic under a spelling.
-    pub(crate) fn add_subscriber(&mut self, topic: &str, subscriber: Subscriber) {
-        let users = self.by_name.entry(topic.into()).or_default();
-        users.subscribers.push(subscriber);
-    }
-
-    /// A client that uses a topic has named its type. Returns whether it is the topic's first type.
-    pub(crate) fn note_type(&mut self, topic: &str, type_name: &str) -> bool {
-        let Some(users) = self.by_name.get_mut(topic) else {
-            return false;
+        origin: &FrameOrigin,
+        topic: &str,
+        type_name: Option<&str>,
+    ) -> Result<(), Refusal> {
+        refuse_runtime_topic(topic)?;
+        let topic = &*names::absolute(topic);
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
         };
-        if users.known.is_none() {
-            users.known = types::find(type_name);
+        let before = client.registered.advertised.get(topic);
+        let is_new = before.is_none();
+        let bytes = topic.len() + type_name.map_or(0, str::len);
+        let entry = client.kept.enter(bytes, before)?;
+        if is_new {
+            self.topics.add_publisher(topic);
         }
-        let is_first = users.type_name.is_none();
-        users.type_name.get_or_insert_with(|| type_name.into());
-        is_first
+        let is_noted = type_name.is_some_and(|name| self.topics.note_type(topic, name));
+        if is_new || is_noted {
+            client.registered.advertised.insert(topic.into(), entry);
+        }
+        if let Some(topic) = Topic::from_name(topic) {
+            client.withdrawn.remove(&topic);
+        }
+        Ok(())
     }
 
-    /// A client has stopped advertising a topic.
-    pub(crate) fn remove_publisher(&mut self, topic: &str) {
-        self.remove(topic, |users| {
-            users.publishers = users.publishers.saturating_sub(1);
-        });
-    }
-
-    /// A client has stopped subscribing to a topic under this spelling.
-    pub(crate) fn remove_subscriber(&mut self, topic: &str, spelling: &str, client: ConnectionId) {
-        self.remove(topic, |users| {
-            users
-                .subscribers
-                .retain(|one| one.connection != client || *one.spelling != *spelling);
-        });
-    }
-
-    fn remove(&mut self, topic: &str, change: impl FnOnce(&mut TopicUsers)) {
-        let Some(users) = self.by_name.get_mut(topic) else {
-            debug_assert!(false, "{topic} was not counted");
+    pub(super) fn unadvertise(&mut self, origin: &FrameOrigin, topic: &str) {
+        let Some(client) = self.clients.get_mut(&origin.from) else {
             return;
         };
-        change(users);
-        if users.publishers == 0 && users.subscribers.is_empty() {
-            self.by_name.remove(topic);
+        let topic = &*names::absolute(topic);
+        if client.registered.advertised.remove(topic).is_some() {
+            self.topics.remove_publisher(topic);
+        }
+        if let Some(topic) = Topic::from_name(topic).filter(|topic| is_listened_to(*topic)) {
+            client.withdrawn.insert(topic);
         }
     }
 
-    /// The subscribers to a topic, under all its spellings.
-    pub(crate) fn subscribers(&self, topic: &str) -> &[Subscriber] {
-        let users = self.by_name.get(topic);
-        users.map_or(&[], |users| &users.subscribers)
-    }
-
-    /// The client that subscribes to a topic under this spelling.
-    pub(crate) fn subscriber(
+    pub(super) fn subscribe(
         &mut self,
+        origin: &FrameOrigin,
+        subscribe: &Subscribe,
+    ) -> Result<(), Refusal> {
+        let id: Option<Box<str>> = origin.id.as_ref().map(|id| id.get().into());
+        self.may_subscribe(id.as_deref(), subscribe)?;
+        let topic = subscribe.topic.as_str();
+        let absolute = names::absolute(topic);
+        let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
+        let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
+        let first = !self.is_wanted(&absolute);
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        let known = self.topics.subscriber(&absolute, topic, origin.from);
+        let before = known
+            .as_ref()
+            .and_then(|one| one.subscription(id.as_deref()));
+        let is_new = before.is_none();
+        let instead = before.map(|one| &one.entry);
+        let entry = client.kept.enter(topic.len() + bytes, instead)?;
+        let subscription = Subscription {
+            id: id.clone(),
+            throttle: subscribe.throttle,
+            queue_length: subscribe.queue_length,
+            encoding: encoding_for(subscribe),
+            entry,
+        };
+        if known.is_none() {
+            let spelling: Arc<str> = topic.into();
+            client.registered.subscribed.insert(Arc::clone(&spelling));
+            let mailbox = client.outlets.mailbox.clone();
+            let new = Subscriber::new(origin.from, spelling, mailbox);
+            self.topics.add_subscriber(&absolute, new);
+        }
+        if let Some(type_name) = subscribe.type_name.as_deref() {
+            self.topics.note_type(&absolute, type_name);
+        }
+        if let Some(subscriber) = self.topics.subscriber(&absolute, topic, origin.from) {
+            subscriber.change(|one| one.id != id, Some(subscription));
+            if is_new && Topic::from_name(topic).is_some_and(Topic::is_latched) {
+                // The throttle of an earlier subscription must not delay this one's latched message.
+                subscriber.configure(Some(Throttle::NONE));
+            }
+            subscriber.configure(subscriber.throttle());
+        }
+        // Sent first, so that the client gets the status before the first message.
+        let msg = format!("subscribed to {topic}");
+        self.send_status(origin, Level::Info, &msg);
+        if first {
+            self.tell_owner(topic, true);
+        } else if is_new {
+            self.deliver_latched(topic, origin.from);
+        }
+        Ok(())
+    }
+
+    fn may_subscribe(&self, id: Option<&str>, subscribe: &Subscribe) -> Result<(), Refusal> {
+        if id.is_some_and(|id| id.len() > MAX_NAME) {
+            return Err(Refusal::LongSubscriptionId(MAX_NAME));
+        }
+        let topic = subscribe.topic.as_str();
+        if subscribe.encoding.compression == Compression::CborRaw {
+            let own = || subscribe.type_name.as_deref().and_then(types::find);
+            if self.known_type(topic).is_none() && own().is_none() {
+                return Err(Refusal::UnknownType);
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
+        let absolute = names::absolute(topic);
+        let subscriber = self.topics.subscriber(&absolute, topic, origin.from);
+        let Some(subscriber) = subscriber else {
+            return;
+        };
+        let ended = origin.id.as_ref().map(Payload::get);
+        subscriber.change(|one| ended.is_some() && one.id.as_deref() != ended, None);
+        let throttle = subscriber.throttle();
+        subscriber.configure(throttle);
+        if throttle.is_none() {
+            if let Some(client) = self.clients.get_mut(&origin.from) {
+                client.registered.subscribed.remove(topic);
+            }
+            self.drop_subscriber(topic, origin.from);
+        }
+    }
+
+    /// Whether the topic has a subscriber or a tap. `topic` is an absolute name.
+    fn is_wanted(&self, topic: &str) -> bool {
+        self.tap.is_some() || !self.topics.subscribers(topic).is_empty()
+    }
+
+    /// Notes that the topic's last subscriber has gone.
+    fn note_unwanted(&mut self, topic: &str) {
+        if let Some(topic) = Topic::from_name(topic) {
+            self.latched.remove(&topic);
+        }
+        self.tell_owner(topic, false);
+    }
+
+    fn tell_owner(&self, topic: &str, wanted: bool) {
+        if let Some(topic) = Topic::from_name(topic)
+            && let Some(owner) = self.nodes.publishers.get(&topic)
+        {
+            owner.do_send(Interest { topic, wanted });
+        }
+    }
+
+    /// Withdraws a client's registrations. The cleanup ends the calls and goals that wait for its answer, because there
+    /// may be many.
+    pub(super) fn withdraw(&mut self, id: ConnectionId) {
+        let Some(client) = self.clients.get_mut(&id) else {
+            return;
+        };
+        let registered = std::mem::take(&mut client.registered);
+        for topic in registered.advertised.keys() {
+            self.topics.remove_publisher(topic);
+        }
+        for topic in &registered.subscribed {
+            self.drop_subscriber(topic, id);
+        }
+        for (kind, name) in registered.served.keys() {
+            self.directory.withdraw(*kind, name, id);
+        }
+        if self.requests.waiting_for(id).is_some() {
+            self.gone.push_back(id);
+        }
+    }
+
+    /// Removes a subscriber from a topic, and notifies the topic's owner if it was the last one.
+    pub(super) fn drop_subscriber(&mut self, topic: &str, connection: ConnectionId) {
+        let name = names::absolute(topic);
+        self.topics.remove_subscriber(&name, topic, connection);
+        if let Some(client) = self.clients.get_mut(&connection)
+            && Topic::from_name(&name) == Some(Topic::TfWebFeedback)
+            && !names::spellings(&name).any(|one| client.registered.subscribed.contains(one))
+        {
+            client.listening = Arc::default();
+        }
+        if !self.is_wanted(&name) {
+            self.note_unwanted(&name);
+        }
+    }
+}
+
+/// The encoding that a subscription requests. If it names the ROS 1 type of a topic of the runtime, stamps also have
+/// the names of ROS 1. CDR has no names.
+fn encoding_for(subscribe: &Subscribe) -> Encoding {
+    let own = Topic::from_name(&subscribe.topic).filter(|topic| !is_listened_to(*topic));
+    let mut asked = own.zip(subscribe.type_name.as_deref()).into_iter();
+    let is_ros1 = asked.any(|(topic, asked)| is_ros1_name(asked, topic.type_name()));
+    Encoding {
+        ros1_stamps: is_ros1 && subscribe.encoding.compression != Compression::CborRaw,
+        ..subscribe.encoding
+    }
+}
+
+/// Refuses the topics that only the runtime may publish.
+pub(super) fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
+    match Topic::from_name(topic) {
+        Some(own) if !is_listened_to(own) => Err(Refusal::RuntimeTopic(topic.to_owned())),
+        _ => Ok(()),
+    }
+}
+
+/// Whether the runtime itself subscribes to the topic.
+pub(super) fn is_listened_to(topic: Topic) -> bool {
+    topic.direction() == Direction::Subscribed
+}
+
+// ---- published messages ---------------------------------------------------------------------------------------------
+
+impl Registry {
+    /// Delivers a client's message to the topic's subscribers, and to the runtime's own subscriber if there is one.
+    pub(super) fn publish(
+        &mut self,
+        origin: FrameOrigin,
         topic: &str,
-        spelling: &str,
-        client: ConnectionId,
-    ) -> Option<&mut Subscriber> {
-        let mut all = self.by_name.get_mut(topic)?.subscribers.iter_mut();
-        all.find(|one| one.connection == client && *one.spelling == *spelling)
+        msg: Payload,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        if let Err(why) = refuse_runtime_topic(topic) {
+            self.refuse(&origin, &why);
+            return Handled::at_once();
+        }
+        let topic = &*names::absolute(topic);
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Handled::at_once();
+        };
+        let listener = Topic::from_name(topic)
+            .filter(|topic| is_listened_to(*topic) && !client.withdrawn.contains(topic))
+            .and_then(|topic| Some((topic, self.nodes.listeners.get(&topic)?)));
+        if listener.is_none() && !client.registered.advertised.contains_key(topic) {
+            return Handled::at_once();
+        }
+        let encode = |spelling: &str| messages::publish_raw(spelling, &msg);
+        let delivered = self.fan_out(topic, encode);
+        let Some((topic, listener)) = listener else {
+            return self.finish_delivery(delivered, ctx);
+        };
+        let (done, ended) = guard();
+        self.encode_aside(delivered.long, &done, ctx);
+        if let Some(tap) = &mut self.tap {
+            tap(Tapped::NodeMessage(topic, &msg));
+        }
+        listener(TopicMessage {
+            msg,
+            respond: ctx.address().recipient(),
+            connection: origin.from,
+            present: Arc::downgrade(&client.present),
+            listening: Arc::downgrade(&client.listening),
+            id: origin.id,
+            done,
+        });
+        Handled::with(ended).delivered(delivered.count)
     }
 
-    /// The type of a topic, if a client has named a known type.
-    pub(crate) fn known_type(&self, topic: &str) -> Option<Type> {
-        self.by_name.get(topic)?.known
+    /// Delivers messages of a client unchanged, if it advertises the topic.
+    pub(super) fn publish_lines(
+        &self,
+        from: ConnectionId,
+        lines: &Series,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        let topic = &*lines.topic;
+        let client = self.clients.get(&from);
+        if client.is_none_or(|client| !client.registered.advertised.contains_key(topic)) {
+            return Handled::at_once();
+        }
+        let encode = |spelling: &str| messages::respelled(topic, spelling, &lines.frames);
+        self.finish_delivery(self.fan_out(topic, encode), ctx)
     }
 
-    /// The topics in the form of rosapi.
-    pub(crate) fn listed(&self) -> impl Iterator<Item = ListedTopic> {
-        self.by_name.iter().map(|(name, users)| ListedTopic {
-            name: Arc::clone(name),
-            type_name: users.type_name.clone(),
-            published: users.publishers > 0,
-            subscribed: !users.subscribers.is_empty(),
-        })
+    /// Delivers a message, or a series of messages, to every subscriber of `topic`, an absolute name, in all spellings.
+    /// `encode` makes the JSON for a spelling. Long messages are not encoded in other forms yet.
+    fn fan_out(&self, topic: &str, encode: impl Fn(&str) -> Bytes) -> Delivered {
+        let subscribers = self.topics.subscribers(topic);
+        let mut plain: Vec<(&str, Bytes)> = Vec::new();
+        let mut others: Vec<(&str, Encoding)> = Vec::new();
+        let mut long = Vec::new();
+        for subscriber in subscribers {
+            let (spelling, encoding) = (&*subscriber.spelling, subscriber.encoding);
+            let known = plain.iter().find(|(known, _)| *known == spelling);
+            let frame = match known {
+                Some((_, frame)) => frame.clone(),
+                None => {
+                    let frame = cover_message(self.permit.as_ref(), encode(spelling));
+                    plain.push((spelling, frame.clone()));
+                    frame
+                }
+            };
+            if is_sent_plain(encoding, frame.len()) {
+                deliver(subscriber, frame);
+            } else if !others.contains(&(spelling, encoding)) {
+                others.push((spelling, encoding));
+                let message = self.to_encode(spelling, frame, encoding);
+                if message.is_long() {
+                    long.push(message);
+                } else {
+                    self.deliver_made(&message, &message.make());
+                }
+            }
+        }
+        let count = subscribers.len();
+        Delivered { count, long }
     }
+
+    /// Ends the delivery of a client's message. The client waits for the encoding of a long one.
+    fn finish_delivery(&self, delivered: Delivered, ctx: &mut Context<Self>) -> Handled {
+        let Delivered { count, long } = delivered;
+        if long.is_empty() {
+            return Handled::at_once().delivered(count);
+        }
+        let (done, ended) = guard();
+        self.encode_aside(long, &done, ctx);
+        Handled::with(ended).delivered(count)
+    }
+
+    /// Encodes long messages on worker threads, and delivers them.
+    fn encode_aside(&self, long: Vec<ToEncode>, done: &Done, ctx: &mut Context<Self>) {
+        for message in long {
+            let done = Done::clone(done);
+            let kind = WorkKind::of(message.plain.len());
+            let making = run_long_work(kind, move || (message.make(), message));
+            ctx.spawn(making.into_actor(self).map(move |made, registry, _| {
+                if let Some((made, message)) = made {
+                    registry.deliver_made(&message, &made);
+                }
+                drop(done);
+            }));
+        }
+    }
+
+    /// Delivers a message in one form to the subscribers that requested that form.
+    fn deliver_made(&self, message: &ToEncode, made: &Made) {
+        let topic = names::absolute(&message.spelling);
+        for subscriber in self.subscribers_as(&topic, &message.spelling) {
+            if subscriber.encoding == message.encoding {
+                self.deliver_form(subscriber, made);
+            }
+        }
+    }
+
+    /// The subscribers to `topic`, an absolute name, under this spelling.
+    fn subscribers_as(&self, topic: &str, spelling: &str) -> impl Iterator<Item = &Subscriber> {
+        let subscribers = self.topics.subscribers(topic).iter();
+        subscribers.filter(move |one| *one.spelling == *spelling)
+    }
+
+    /// Delivers the messages of a form. Messages that could not be made count as dropped.
+    fn deliver_form(&self, subscriber: &Subscriber, made: &Made) {
+        self.gauges.add_dropped(made.lost);
+        for frame in &made.messages {
+            deliver(subscriber, frame.clone());
+        }
+    }
+
+    /// Delivers a latched topic's last message to a new subscription.
+    pub(super) fn deliver_latched(&self, spelling: &str, to: ConnectionId) {
+        let latched = Topic::from_name(spelling).map(|topic| (topic, self.latched.get(&topic)));
+        let Some((topic, Some(frame))) = latched else {
+            return;
+        };
+        let mut subscribers = self.subscribers_as(topic.name(), spelling);
+        if let Some(subscriber) = subscribers.find(|one| one.connection == to) {
+            let plain = messages::respelled(topic.name(), spelling, frame);
+            if is_sent_plain(subscriber.encoding, plain.len()) {
+                return deliver(subscriber, plain);
+            }
+            let message = self.to_encode(spelling, plain, subscriber.encoding);
+            self.deliver_form(subscriber, &message.make());
+        }
+    }
+
+    /// The type of a topic's messages: the runtime's own, or a known type that a client has given.
+    pub(super) fn known_type(&self, topic: &str) -> Option<&'static str> {
+        match Topic::from_name(topic) {
+            Some(topic) => Some(topic.type_name()),
+            None => Some(self.topics.known_type(&names::absolute(topic))?.name),
+        }
+    }
+
+    /// A JSON frame, or a series of frames, to encode in another form.
+    fn to_encode(&self, spelling: &str, plain: Bytes, encoding: Encoding) -> ToEncode {
+        ToEncode {
+            spelling: spelling.into(),
+            plain,
+            encoding,
+            type_name: self.known_type(spelling),
+            fragmented: Arc::clone(&self.fragmented),
+            permit: self.permit.clone(),
+        }
+    }
+}
+
+impl Handler<Publish> for Registry {
+    type Result = ();
+
+    /// Delivers a message of a node. Stores it if its topic is latched.
+    fn handle(&mut self, Publish { topic, frame }: Publish, _: &mut Context<Self>) {
+        let name = topic.name();
+        if !self.is_wanted(name) {
+            return;
+        }
+        let frame = frame();
+        if let Some(tap) = &mut self.tap {
+            tap(Tapped::Published(topic, &frame));
+        }
+        let encode = |spelling: &str| messages::respelled(name, spelling, &frame);
+        // A node cannot wait, and its messages are short.
+        for message in self.fan_out(name, encode).long {
+            self.deliver_made(&message, &message.make());
+        }
+        if topic.is_latched() {
+            self.latched.insert(topic, frame);
+        }
+    }
+}
+
+impl Handler<SetTap> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, SetTap(tap): SetTap, _: &mut Context<Self>) {
+        let was_set = self.tap.is_some();
+        self.tap = tap;
+        for topic in Topic::ALL {
+            if self.topics.subscribers(topic.name()).is_empty() {
+                match (was_set, self.tap.is_some()) {
+                    (_, true) => self.tell_owner(topic.name(), true),
+                    (true, false) => self.note_unwanted(topic.name()),
+                    (false, false) => {}
+                }
+            } else if let (Some(frame), Some(tap)) = (self.latched.get(&topic), &mut self.tap) {
+                tap(Tapped::Published(topic, frame));
+            }
+        }
+    }
+}
+
+/// The result of a fan-out.
+struct Delivered {
+    /// The number of subscribers.
+    count: usize,
+    /// Long messages that are still to be encoded in another form.
+    long: Vec<ToEncode>,
+}
+
+/// Whether frames of `length` bytes are sent unchanged to a subscriber that requested `encoding`.
+fn is_sent_plain(encoding: Encoding, length: usize) -> bool {
+    let is_short = encoding.fragment_size.is_none_or(|size| length <= size);
+    encoding.compression == Compression::None && is_short && !encoding.ros1_stamps
+}
+
+fn deliver(subscriber: &Subscriber, frame: Bytes) {
+    let topic = Some(Arc::clone(&subscriber.spelling));
+    subscriber
+        .mailbox
+        .do_send(ToClient::Deliver { topic, frame });
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::super::Topics;
+    use crate::protocol::ros::rosapi::ListedTopic;
 
     #[test]
     fn the_first_type_stays_with_a_topic_and_a_topic_with_its_last_user() {

@@ -1,0 +1,390 @@
+//! The state of one client that the actor's handlers, its reader and its writer share: its transport, its computations
+//! and its output. The writer drains the output, and only the writer writes to the socket of a served client.
+//!
+//! The writer is polled after each message that the actor has handled, so the contents of the outbox are offered to the
+//! socket in the same turn.
+//!
+//! **Invariant:** a write that the client does not take blocks only this connection, and only until a deadline. The
+//! deadline expires only for a client that is finishing, or for which responses or a long message have waited without a
+//! break. One poll writes a bounded number of bytes.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::future::poll_fn;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::task::{self, Poll, ready};
+
+use actix::prelude::*;
+use bytes::Bytes;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::time::{Instant, Sleep, sleep_until};
+
+use super::flow::{Ends, FRESH, FlowControl, UnreadSource};
+use super::transport::{ClientLost, Transport};
+use super::turns::Turns;
+use crate::actors::gateway::limits::{
+    LINGER, MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES,
+};
+use crate::actors::gateway::registry::{Registry, Request, ToClient};
+use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::memory::SHORT;
+use crate::protocol::catalog::Service;
+use crate::protocol::messages::{self, Level};
+use crate::protocol::outbox::{MAX_AGE, Outbox};
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The state of one client that the actor's handlers, its reader and its writer share.
+pub(super) struct ClientState<S> {
+    /// The stream, after the session has ended.
+    pub(super) transport: Option<Transport<S>>,
+    pub(super) ends: Ends,
+    pub(super) registry: Addr<Registry>,
+    pub(super) gauges: Arc<Gauges>,
+    outbox: Outbox,
+    flow: FlowControl,
+    /// Whether each write has only one frame. Old clients, which end their frames without a newline, treat the bytes of
+    /// one read as one frame.
+    pub(super) is_single: bool,
+    /// Bytes of short responses in the outbox. The registry reads it.
+    pub(super) backlog: Arc<AtomicUsize>,
+    /// Time when the frames being written left the outbox, or when the client last took bytes of them.
+    pub(super) progress: Instant,
+    /// Start of the time in which responses have waited without a break.
+    responses_since: Option<Instant>,
+    /// Heavy calls that wait for the running one, each with the length of its frame.
+    computations: VecDeque<(Request, usize)>,
+    /// Whether a heavy call runs.
+    is_running: bool,
+    /// Set when nothing more is read. Queued messages are still sent.
+    pub(super) is_finishing: bool,
+    /// Set if the client uses another protocol or violates a rule. It gets the reason, and its input is discarded.
+    pub(super) is_refused: bool,
+    /// Set when the reader has ended.
+    pub(super) is_read_to_its_end: bool,
+}
+
+impl<S> ClientState<S> {
+    /// The state of a client whose session has not ended.
+    pub(super) fn new(
+        ends: Ends,
+        unread: UnreadSource,
+        registry: Addr<Registry>,
+        gauges: Arc<Gauges>,
+    ) -> Self {
+        let now = Instant::now();
+        Self {
+            transport: None,
+            ends,
+            registry,
+            gauges,
+            outbox: Outbox::new(),
+            flow: FlowControl::new(unread, now),
+            is_single: false,
+            backlog: Arc::default(),
+            progress: now,
+            responses_since: None,
+            computations: VecDeque::new(),
+            is_running: false,
+            is_finishing: false,
+            is_refused: false,
+            is_read_to_its_end: false,
+        }
+    }
+
+    /// The transport of a client that is served.
+    pub(super) fn transport(&mut self) -> Result<&mut Transport<S>, ClientLost> {
+        self.transport.as_mut().ok_or(ClientLost::Gone)
+    }
+
+    // ---- into the outbox --------------------------------------------------------------------------------------------
+
+    /// Puts a message of the registry into the outbox.
+    pub(super) fn accept(&mut self, message: ToClient) {
+        match message {
+            ToClient::Deliver { topic, frame } => {
+                let now = Instant::now().into_std();
+                self.counting_dropped(|outbox| match &topic {
+                    Some(topic) => outbox.push(topic, frame, now),
+                    None => outbox.push_feedback(frame, now),
+                });
+            }
+            ToClient::Respond { frame, service } => {
+                self.push_response(frame, service.map_or(&[], Service::supersedes));
+                if service.is_some_and(Service::is_computation) {
+                    self.is_running = false;
+                    self.start_computation();
+                }
+            }
+            ToClient::Configure { topic, throttle } => self.outbox.configure(&topic, throttle),
+            ToClient::Finish => self.is_finishing = true,
+        }
+    }
+
+    fn counting_dropped(&mut self, act: impl FnOnce(&mut Outbox)) {
+        let before = self.outbox.dropped();
+        act(&mut self.outbox);
+        let dropped = self.outbox.dropped() - before;
+        if dropped > 0 {
+            self.gauges.add_dropped(dropped);
+        }
+    }
+
+    /// Adds a response or a status. Discards held-back messages on `superseded` topics, because they are older.
+    fn push_response(&mut self, frame: Bytes, superseded: &[&'static str]) {
+        self.responses_since.get_or_insert_with(Instant::now);
+        self.outbox.push_response(frame, superseded);
+        self.note_backlog();
+    }
+
+    /// Refuses the client: it gets a status with the reason, and its further input is discarded.
+    pub(super) fn refuse(&mut self, why: &str) {
+        self.is_refused = true;
+        let status = messages::status(Level::Error, why, None);
+        self.push_response(status, &[]);
+    }
+
+    // ---- out of the outbox ------------------------------------------------------------------------------------------
+
+    /// Takes the next frames out of the outbox, if all previous ones were written. Returns whether there are frames to
+    /// write. Nothing is held back from a client whose connection is finishing.
+    fn take_frames(&mut self) -> bool {
+        if self.outbox.writing().len() > 0 {
+            return true;
+        }
+        let (has_topics, holds_back) = (self.outbox.has_topics(), self.outbox.holds_back());
+        if self.outbox.is_empty() && !holds_back {
+            return false;
+        }
+        let now = Instant::now();
+        let room = if self.is_finishing {
+            usize::MAX
+        } else if has_topics || holds_back {
+            self.flow.room(now)
+        } else {
+            0
+        };
+        let most = if self.is_single { 1 } else { WRITE_FRAMES };
+        let is_far_behind = !self.is_finishing && self.flow.is_far_behind();
+        let fresh = if is_far_behind { FRESH } else { MAX_AGE };
+        self.counting_dropped(|outbox| {
+            outbox.allow(room, fresh);
+            outbox.take_frames(now.into_std(), most, WRITE_BYTES);
+        });
+        self.progress = now;
+        self.outbox.writing().len() > 0
+    }
+
+    /// Notes that `bytes` of the frames were written. Returns whether that allows the client to be read again.
+    fn note_written(&mut self, bytes: usize) -> bool {
+        let may_read = self.may_read();
+        self.progress = Instant::now();
+        self.flow.note_written(bytes, self.progress);
+        self.outbox.written(bytes);
+        if self.responses_since.is_some() {
+            self.note_backlog();
+        }
+        if self.outbox.response_bytes() == 0 {
+            self.responses_since = None;
+        }
+        self.start_computation();
+        !may_read && self.may_read()
+    }
+
+    fn note_backlog(&self) {
+        let waiting = self.outbox.short_bytes();
+        self.backlog.store(waiting, Ordering::Relaxed);
+    }
+
+    /// The earliest time of the next write, if nothing can be written now. Either a message is throttled, or the client
+    /// must read first.
+    fn next_release(&self) -> Option<Instant> {
+        let release = self.outbox.next_release().map(Instant::from_std);
+        let waits = self.outbox.has_topics() && !self.outbox.has_responses();
+        let look = self.flow.next_look().filter(|_| waits);
+        release.into_iter().chain(look).min()
+    }
+
+    /// Whether the client has read nothing for too long while a long message waits.
+    fn is_stuck(&self) -> bool {
+        self.flow.age() > STALL_LIMIT && self.outbox.has_long()
+    }
+
+    /// The deadline of a client that takes no byte of a write. `None` if no response or long message waits, unless it
+    /// is finishing. `taken` is the time when it last took a byte of the current write.
+    fn patience(&self, taken: Option<Instant>) -> Option<Instant> {
+        let last_byte = taken.map_or(self.progress, |taken| taken.max(self.progress));
+        match self.responses_since {
+            Some(since) => Some(since.max(last_byte) + STALL_LIMIT),
+            None if self.is_finishing => Some(last_byte + LINGER),
+            None => self.outbox.has_long().then(|| last_byte + STALL_LIMIT),
+        }
+    }
+
+    // ---- computations: one runs, and others wait --------------------------------------------------------------------
+
+    /// Whether the reader may go on: neither too many responses nor too many computations wait, or it is to end.
+    pub(super) fn may_read(&self) -> bool {
+        let waiting = &self.computations;
+        let bytes: usize = waiting.iter().map(|(_, length)| length).sum();
+        let are_too_many = waiting.len() >= MAX_COMPUTATIONS_WAITING || bytes >= SHORT;
+        self.is_finishing || (self.may_compute() && !are_too_many)
+    }
+
+    /// Whether another computation may start: not too many responses wait.
+    const fn may_compute(&self) -> bool {
+        self.outbox.response_bytes() <= MAX_RESPONSES_WAITING
+    }
+
+    /// Queues a heavy call, whose frame had `length` bytes.
+    pub(super) fn enqueue_computation(&mut self, request: Request, length: usize) {
+        self.computations.push_back((request, length));
+        self.start_computation();
+    }
+
+    /// Starts the next computation if none runs and not too many responses wait. They run in order of arrival.
+    fn start_computation(&mut self) {
+        if !self.is_running
+            && self.may_compute()
+            && let Some((request, _)) = self.computations.pop_front()
+        {
+            self.is_running = true;
+            self.registry.do_send(request);
+        }
+    }
+
+    /// Whether a computation runs or waits.
+    pub(super) fn is_computing(&self) -> bool {
+        self.is_running || !self.computations.is_empty()
+    }
+
+    /// Drops the computations: the client no longer waits for them.
+    pub(super) fn abandon_computations(&mut self) {
+        self.computations.clear();
+        self.is_running = false;
+    }
+}
+
+// ---- the writer -----------------------------------------------------------------------------------------------------
+
+/// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
+pub(super) fn write<S>(client: Rc<RefCell<ClientState<S>>>) -> impl Future<Output = ()>
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
+    let mut writer = ClientWriter::default();
+    poll_fn(move |cx| writer.poll_to_the_end(&mut client.borrow_mut(), cx))
+}
+
+/// The writing half of a connection.
+#[derive(Default)]
+struct ClientWriter {
+    timer: Option<Pin<Box<Sleep>>>,
+    turns: Turns,
+    /// Deadline of the end of the stream.
+    end_due: Option<Instant>,
+    /// Deadline of the reader, which continues after all messages were written.
+    reader_due: Option<Instant>,
+}
+
+impl ClientWriter {
+    fn poll_to_the_end<S: AsyncRead + AsyncWrite + Unpin>(
+        &mut self,
+        client: &mut ClientState<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<()> {
+        if self.reader_due.is_none() {
+            let is_all_written = ready!(self.poll_write(client, cx));
+            let transport = client.transport.as_ref();
+            let is_answered = transport.is_some_and(Transport::is_socket);
+            if !is_all_written || !(client.is_refused || is_answered) {
+                return Poll::Ready(());
+            }
+            self.reader_due = Some(Instant::now() + LINGER);
+        }
+        if client.is_read_to_its_end {
+            return Poll::Ready(());
+        }
+        self.poll_timer(self.reader_due, cx)
+    }
+
+    /// Ready once `due` has passed. Without a deadline it is never ready.
+    fn poll_timer(&mut self, due: Option<Instant>, cx: &mut task::Context<'_>) -> Poll<()> {
+        let Some(due) = due else {
+            return Poll::Pending;
+        };
+        let timer = self.timer.get_or_insert_with(|| Box::pin(sleep_until(due)));
+        if timer.deadline() != due {
+            timer.as_mut().reset(due);
+        }
+        timer.as_mut().poll(cx)
+    }
+
+    /// Writes the queued messages. Ready at the end of the connection, with whether all of them were written.
+    fn poll_write<S: AsyncRead + AsyncWrite + Unpin>(
+        &mut self,
+        client: &mut ClientState<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<bool> {
+        let mut written = 0;
+        loop {
+            let is_done = client.is_finishing && !client.is_computing();
+            let has_frames = client.take_frames();
+            let Some(transport) = &mut client.transport else {
+                return Poll::Ready(false);
+            };
+            let (patience, release) = if has_frames {
+                match transport.poll_write(cx, client.outbox.writing()) {
+                    Poll::Ready(Ok(bytes)) => {
+                        // After many bytes, other connections have a turn. The reader may continue.
+                        let may_read = client.note_written(bytes);
+                        written += bytes;
+                        if written >= WRITE_BYTES / 2 {
+                            self.turns.end(cx);
+                            return Poll::Pending;
+                        }
+                        if may_read {
+                            cx.waker().wake_by_ref();
+                        }
+                        continue;
+                    }
+                    Poll::Ready(Err(_)) => return Poll::Ready(false),
+                    Poll::Pending => {}
+                }
+                let taken = transport.last_taken();
+                (client.patience(taken), None)
+            } else if is_done {
+                return self.poll_end(client, cx);
+            } else {
+                let is_gone = matches!(transport.poll_flush(cx), Poll::Ready(Err(_)));
+                if is_gone || client.is_stuck() {
+                    return Poll::Ready(false);
+                }
+                self.turns.rest();
+                (None, client.next_release())
+            };
+            ready!(self.poll_timer(patience.or(release), cx));
+            if patience.is_some() {
+                return Poll::Ready(false);
+            }
+        }
+    }
+
+    fn poll_end<S: AsyncRead + AsyncWrite + Unpin>(
+        &mut self,
+        client: &mut ClientState<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<bool> {
+        let is_refused = client.is_refused;
+        if let Some(transport) = &mut client.transport
+            && let Poll::Ready(ended) = transport.poll_end(cx, is_refused)
+        {
+            return Poll::Ready(ended.is_ok());
+        }
+        let due = *self.end_due.get_or_insert_with(|| Instant::now() + LINGER);
+        self.poll_timer(Some(due), cx).map(|()| false)
+    }
+}
