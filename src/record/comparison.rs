@@ -9,7 +9,7 @@ use std::io::Read;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::journal::{Note, NoteError, links, read_note};
+use super::journal::{Note, NoteError, links_and_version, read_note};
 use super::reader::{ReadError, RecordEnding, RecordedMessage, Recording};
 use super::schema::{INPUTS, STATES};
 use super::writer::VERSION;
@@ -157,11 +157,16 @@ impl fmt::Display for ReplayVerdict {
 pub fn replay(file: impl Read) -> Result<ReplayVerdict, ReplayError> {
     let mut recording = Recording::new(file);
     let first = first_input(&mut recording)?;
-    match links(&fields::<InputMessage>(&first)?.input) {
-        Some(2) => play::<2>(recording, first),
-        Some(3) => play::<3>(recording, first),
-        _ => Err(ReplayError::NoStates),
-    }
+    let begun = links_and_version(&fields::<InputMessage>(&first)?.input);
+    let mut verdict = match begun {
+        Some((2, _)) => play::<2>(recording, first)?,
+        Some((3, _)) => play::<3>(recording, first)?,
+        _ => return Err(ReplayError::NoStates),
+    };
+    let version = begun.map(|(_, version)| version);
+    let other = version.filter(|version| version != VERSION);
+    verdict.other_version = other.map(|version| version.chars().take(MAX_VERSION).collect());
+    Ok(verdict)
 }
 
 /// The error for a record without states, by its end.
@@ -192,10 +197,6 @@ fn play<const N: usize>(
         taken: 0,
         verdict: ReplayVerdict {
             links: N,
-            other_version: recording
-                .version()
-                .filter(|version| *version != VERSION)
-                .map(|version| version.chars().take(MAX_VERSION).collect()),
             ..ReplayVerdict::default()
         },
     };
