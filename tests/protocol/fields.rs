@@ -4,7 +4,7 @@
 
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::op::Arguments;
-use pendularm::protocol::op::fields::{Bound, Fields, Reason, RejectedField};
+use pendularm::protocol::op::fields::{Bound, Fields};
 use serde_json::value::RawValue;
 
 fn args(text: &str) -> Arguments {
@@ -25,28 +25,18 @@ fn reading<T>(
     let args = args(text);
     let mut fields = Fields::read(&args, service).expect("arguments that fit");
     let value = read(&mut fields);
-    assert_eq!(fields.accepted(), fields.status().is_empty());
-    (value, fields.status())
+    let is_accepted = fields.accepted();
+    let status = fields.finish().status();
+    assert_eq!(is_accepted, status.is_empty());
+    (value, status)
 }
 
 #[test]
 fn another_layer_may_refuse_a_field_or_a_member_in_its_own_words() {
-    let (rejections, status) = reading(Service::Rollout, r#"{"gains":{}}"#, |fields| {
+    let (_, status) = reading(Service::Rollout, r#"{"gains":{}}"#, |fields| {
         fields.refuse("samples", &"is not to be trusted");
         fields.object("gains", |gains| gains.refuse("kp", &"is not to my taste"));
-        fields.rejections().to_vec()
     });
-    let refused = |field: &str, why: &str| RejectedField {
-        field: field.to_owned(),
-        reason: Reason::Refused(why.to_owned()),
-    };
-    assert_eq!(
-        rejections,
-        [
-            refused("samples", "is not to be trusted"),
-            refused("gains.kp", "is not to my taste"),
-        ]
-    );
     assert_eq!(
         status,
         "samples is not to be trusted; gains.kp is not to my taste"
