@@ -43,25 +43,16 @@ pub struct ShutDown(pub &'static str);
 
 /// Why a question has no answer. It has had no effect, and will have none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Unserved {
-    /// The node dropped it.
-    #[error("the node that serves this ended before it answered")]
-    Ended,
-    /// Another node that was needed has ended.
-    #[error("{0} does not answer")]
-    NoAnswer(
-        /// Its name.
-        &'static str,
-    ),
+#[error("{0}")]
+pub struct Unserved(pub &'static str);
+
+impl Unserved {
+    /// The node dropped the question.
+    pub const ENDED: Self = Self("the node that serves this ended before it answered");
+    /// The arm has ended.
+    pub const NO_ARM: Self = Self("arm_sim does not answer");
     /// The caller has disconnected.
-    #[error("the caller is gone")]
-    CallerGone,
-    /// Too many questions wait, or none is accepted.
-    #[error("{0}")]
-    Refused(
-        /// The reason.
-        &'static str,
-    ),
+    pub const CALLER_GONE: Self = Self("the caller is gone");
 }
 
 /// A guard of an op that has not yet taken effect: a call, a goal, or a message for its subscribers. The
@@ -168,7 +159,7 @@ impl<T> Reply<T> {
 impl<T> Drop for Reply<T> {
     fn drop(&mut self) {
         if self.asker.is_some() {
-            self.refuse(Unserved::Ended);
+            self.refuse(Unserved::ENDED);
         }
     }
 }
@@ -195,7 +186,7 @@ pub fn ask<A: Ask>(
     let (answered, answer) = oneshot::channel();
     let reply = Reply::new(answered, None);
     node.do_send(Call { ask, reply });
-    async move { answer.await.unwrap_or(Err(Unserved::Ended)) }
+    async move { answer.await.unwrap_or(Err(Unserved::ENDED)) }
 }
 
 // ---- between the registry and the nodes -----------------------------------------------------------------------------

@@ -15,7 +15,7 @@ use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Barrier, Call, Interest, Publish, Reply, Unserved, ask};
 use crate::actors::wire::Nodes;
 use crate::math::trial::{Conclusion, Trial, TrialCommand, sample};
-use crate::protocol::catalog::{Node, Service, Topic};
+use crate::protocol::catalog::{Service, Topic};
 use crate::services::trial::status_message;
 pub use crate::services::trial::{STATUS_PERIOD, Terms, TrialRefused, TrialRequest};
 
@@ -166,7 +166,7 @@ impl<const N: usize> IkTrial<N> {
         let Some(pose) = pose else {
             // Without an arm there is nothing to do.
             if let Intent::Perform(_, mut reply) = intent {
-                reply.refuse(Unserved::NoAnswer(Node::ArmSim.name()));
+                reply.refuse(Unserved::NO_ARM);
             }
             return;
         };

@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** a call is answered once. It stops when its caller disconnects.
 
-use std::time::Instant;
+use std::time::Duration;
 
 use super::workers::{Computation, Progress, WorkerPool};
 use crate::actors::node::{Reply, Unserved};
@@ -33,10 +33,10 @@ struct Answering<T, W> {
 }
 
 impl<T: Send, W: Work<T>> Computation for Answering<T, W> {
-    fn advance(&mut self, deadline: Instant) -> Progress {
+    fn advance(&mut self, deadline: Duration) -> Progress {
         while let Some(reply) = &mut self.reply {
             if reply.caller_is_gone() {
-                self.end(Unserved::CallerGone);
+                self.end(Unserved::CALLER_GONE);
                 break;
             }
             if !self.has_room {
@@ -44,7 +44,7 @@ impl<T: Send, W: Work<T>> Computation for Answering<T, W> {
                     return Progress::Waiting;
                 }
                 self.has_room = true;
-            } else if let Some(answer) = self.work.advance(work_clock::reading) {
+            } else if let Some(answer) = self.work.advance(work_clock::now) {
                 // Megabytes take a worker some tenths of a second, in which it does nothing else.
                 reply.answer(answer);
                 self.reply = None;
@@ -58,7 +58,7 @@ impl<T: Send, W: Work<T>> Computation for Answering<T, W> {
     }
 
     fn refuse(&mut self, why: &'static str) {
-        self.end(Unserved::Refused(why));
+        self.end(Unserved(why));
     }
 }
 

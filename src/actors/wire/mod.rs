@@ -84,11 +84,22 @@ impl Nodes {
         self.services.insert(service, Box::new(take));
     }
 
-    /// Messages of clients on `topic` are read by `take`.
-    pub fn listen(&mut self, topic: Topic, take: impl Fn(TopicMessage) + Clone + Send + 'static) {
+    /// Messages of clients on `topic` are read by `read`, and are for this node as `to_node` makes them.
+    pub fn listen<T: 'static, E: Display + 'static, M: Message<Result = ()> + Send + 'static>(
+        &mut self,
+        topic: Topic,
+        node: impl Into<Recipient<M>>,
+        read: fn(&Payload) -> Result<T, E>,
+        to_node: fn(T, TopicMessage) -> M,
+    ) {
+        let node = node.into();
         let take = move |message: TopicMessage| {
-            let take = take.clone();
-            read_arguments(message.msg.get().len(), move || take(message));
+            let node = node.clone();
+            let length = message.msg.get().len();
+            read_arguments(length, move || match read(&message.msg) {
+                Ok(content) => node.do_send(to_node(content, message)),
+                Err(why) => message.refuse(topic, &why),
+            });
         };
         self.listeners.insert(topic, Box::new(take));
     }
@@ -263,7 +274,7 @@ impl Caller {
 
 impl Drop for Caller {
     fn drop(&mut self) {
-        self.refuse(&Unserved::Ended.to_string());
+        self.refuse(&Unserved::ENDED.to_string());
     }
 }
 

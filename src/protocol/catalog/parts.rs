@@ -4,6 +4,7 @@
 //! **Invariant:** the fields of a type of ROS are those of its definition. Parts that nothing here uses are empty.
 
 use super::entry::{Constant, Field, Type, byte, fields, message};
+use super::types;
 
 /// The members of `params` in a request are the fields of `/arm_sim/set_params`.
 pub(super) const PARAMS: &[Field] = fields![
@@ -182,11 +183,10 @@ const HEALTH: &[Constant] = &[
 ];
 
 impl Field {
-    /// The members of an object field of a request or a response, in documented order; empty for every other field.
+    /// The members of an object field of a request, a message or a response, in documented order; empty for every other
+    /// field.
     #[must_use]
     pub fn members(&self) -> &'static [Self] {
-        let mut types = TYPES.iter();
-        let kind = types.find(|one| one.name == self.kind);
-        kind.map_or(&[], |one| one.fields)
+        types::find(self.kind).map_or(&[], |one| one.fields)
     }
 }

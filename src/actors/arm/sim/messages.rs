@@ -110,10 +110,10 @@ pub struct SetSetpoint<const N: usize> {
     pub done: Option<Done>,
 }
 
-/// Moves the setpoint, if it is still the sender's last one. The answer is whether it was. From
+/// Moves the setpoint, if it is still the sender's last one. If not, the answer is the number of resets of the arm. From
 /// `joint_trajectory_controller`.
 #[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "bool")]
+#[rtype(result = "Result<(), u64>")]
 pub struct MoveSetpoint<const N: usize> {
     /// The sender's last setpoint.
     pub from: Setpoint<N>,
