@@ -245,13 +245,9 @@ impl<const N: usize> Replay<N> {
             self.taken = 0;
             return Ok(());
         }
-        if !self.advance(step, passage)? {
-            return Ok(());
-        }
-        let Some((simulation, _)) = &mut self.arm else {
+        let Some(simulation) = self.advance(step, passage)? else {
             return Ok(());
         };
-        self.verdict.inputs += 1;
         match note {
             Note::Input(input) => simulation.apply(input),
             Note::Diverged if simulation.step() => {
@@ -262,16 +258,14 @@ impl<const N: usize> Replay<N> {
             }
             Note::Diverged | Note::Begin(_) => {}
         }
+        self.verdict.inputs += 1;
         Ok(())
     }
 
     fn state(&mut self, passage: &RecordedMessage) -> Result<(), ReplayError> {
         let recorded: StateMessage = fields(passage)?;
         let step = recorded.step;
-        if !self.advance(step, passage)? {
-            return Ok(());
-        }
-        let Some((simulation, _)) = &self.arm else {
+        let Some(simulation) = self.advance(step, passage)? else {
             return Ok(());
         };
         let state = simulation.state();
@@ -301,10 +295,14 @@ impl<const N: usize> Replay<N> {
         Ok(())
     }
 
-    /// Takes the steps up to that one. Returns `false` if nothing can be compared there.
-    fn advance(&mut self, step: u64, passage: &RecordedMessage) -> Result<bool, ReplayError> {
+    /// Takes the steps up to that one. Returns the simulation, unless nothing can be compared there.
+    fn advance(
+        &mut self,
+        step: u64,
+        passage: &RecordedMessage,
+    ) -> Result<Option<&mut Simulation<N>>, ReplayError> {
         let Some((simulation, at)) = &mut self.arm else {
-            return Ok(false);
+            return Ok(None);
         };
         let due = step.checked_sub(*at);
         let due = due.ok_or(ReplayError::Order { step, after: *at })?;
@@ -330,9 +328,9 @@ impl<const N: usize> Replay<N> {
                 at,
                 "the next step was finite in the record, but is not finite now",
             );
-            return Ok(false);
+            return Ok(None);
         }
-        Ok(true)
+        Ok(self.arm.as_mut().map(|(simulation, _)| simulation))
     }
 
     fn differs(&mut self, step: u64, what: &str) {
