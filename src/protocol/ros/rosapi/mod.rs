@@ -25,25 +25,16 @@ const ROS_VERSION: u8 = 2;
 /// distribution.
 pub(crate) const DISTRO: &str = "jazzy";
 
-/// Why a call has no answer.
+/// The catalog has no type of the name in this field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum AnswerError {
-    /// The catalog has no type of that name.
-    #[error("{field} must name a type that this runtime knows")]
-    UnknownType {
-        /// The field that named it.
-        field: &'static str,
-    },
-    /// The call is for the arm.
-    #[error("the arm was not asked")]
-    OfTheArm,
-}
+#[error("{0} must name a type that this runtime knows")]
+pub struct UnknownType(pub &'static str);
 
 /// The `values` for a call about `asked`, the name in its request; `asked` is empty if the request has no name.
 ///
 /// # Errors
-/// If the type is unknown, or if the call is for the arm.
-pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, AnswerError> {
+/// If the type is unknown.
+pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, UnknownType> {
     let service = Service::Rosapi(question);
     let rows = match question {
         Rosapi::Topics
@@ -90,8 +81,7 @@ pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, A
         | Rosapi::ActionResultDetails
         | Rosapi::ActionFeedbackDetails => {
             let field = service.fields().first().map_or("", |field| field.name);
-            let unknown = AnswerError::UnknownType { field };
-            vec![details(question, asked).ok_or(unknown)?]
+            vec![details(question, asked).ok_or(UnknownType(field))?]
         }
         Rosapi::Interfaces => vec![interfaces().into_iter().collect()],
         Rosapi::GetRosVersion => vec![ROS_VERSION.into(), DISTRO.into()],
@@ -102,7 +92,7 @@ pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, A
         | Rosapi::GetParamNames
         | Rosapi::GetTime => {
             debug_assert!(false, "{question:?} is a question to the arm");
-            return Err(AnswerError::OfTheArm);
+            vec![]
         }
     };
     let names = service.response_fields().iter();
