@@ -117,16 +117,16 @@ impl<const N: usize> Handler<GoalReport<N>> for IkTrial<N> {
     type Result = ();
 
     fn handle(&mut self, news: GoalReport<N>, ctx: &mut Context<Self>) {
-        let mut commands = self.hear(&news.pose);
-        match news.outcome {
-            None => self
-                .trial
-                .feedback(&news.goal_id, news.distance, &news.positions),
+        let GoalReport { goal, progress } = news;
+        let mut commands = self.hear(&progress.pose);
+        let distance = progress.distance;
+        match progress.outcome {
+            None => self.trial.feedback(&goal.id, distance, &goal.positions),
             Some(outcome) => {
                 let conclusion = Conclusion {
-                    goal_id: news.goal_id,
+                    goal_id: goal.id,
                     outcome,
-                    final_distance: news.distance,
+                    final_distance: distance,
                 };
                 let target = || sample(&self.lengths, || self.rng.f64());
                 commands.extend(self.trial.concluded(conclusion, target));
