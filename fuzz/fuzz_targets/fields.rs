@@ -28,8 +28,8 @@ fn examine(input: &[u8]) {
     let Some(args) = arguments(service, args) else {
         return;
     };
-    let Some(json) = Json::read(args.payload().get()) else {
-        panic!("accepted, and no JSON: {}", args.payload().get());
+    let Some(json) = Json::read(args.get()) else {
+        panic!("accepted, and no JSON: {}", args.get());
     };
     let Some(mut model) = Model::new(service, &json) else {
         let refusal = Fields::read(&args, service).expect_err("the other reading refuses it");

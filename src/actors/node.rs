@@ -14,7 +14,6 @@ use serde::Serialize;
 use tokio::sync::oneshot;
 
 use super::ConnectionId;
-use crate::actors::resources::memory::NoRoom;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::wire::json::Payload;
@@ -79,12 +78,9 @@ pub trait Asker<T>: Send {
     /// Sends, before the answer, the reason why the request has no effect yet. For a node this is in the answer.
     fn warn(&self, _why: &str) {}
 
-    /// Reserves memory for an answer of at most `bytes` bytes before it is computed.
-    ///
-    /// # Errors
-    /// While there is not enough.
-    fn reserve(&mut self, _bytes: usize) -> Result<(), NoRoom> {
-        Ok(())
+    /// Reserves memory for an answer of at most `bytes` bytes before it is computed. `false` while there is not enough.
+    fn reserve(&mut self, _bytes: usize) -> bool {
+        true
     }
 }
 
@@ -114,15 +110,11 @@ impl<T> Reply<T> {
         self.asker.as_ref().is_some_and(|asker| asker.is_gone())
     }
 
-    /// Reserves memory for an answer of at most `bytes` bytes before it is computed. Short answers need no reservation.
-    ///
-    /// # Errors
-    /// While there is not enough.
-    pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
-        match &mut self.asker {
-            Some(asker) => asker.reserve(bytes),
-            None => Ok(()),
-        }
+    /// Reserves memory for an answer of at most `bytes` bytes before it is computed. `false` while there is not enough.
+    /// Short answers need no reservation.
+    pub fn reserve(&mut self, bytes: usize) -> bool {
+        let asker = self.asker.as_mut();
+        asker.is_none_or(|asker| asker.reserve(bytes))
     }
 
     /// Sends a client a status, before the answer, with the reason why the request has no effect yet.

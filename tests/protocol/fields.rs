@@ -9,11 +9,7 @@ use serde_json::value::RawValue;
 
 fn args(text: &str) -> Arguments {
     let raw = RawValue::from_string(text.to_owned()).expect("valid JSON");
-    if text.starts_with('[') {
-        Arguments::Positional(raw.into())
-    } else {
-        Arguments::Object(raw.into())
-    }
+    raw.into()
 }
 
 /// The values that `read` takes from a request, and the status.

@@ -92,7 +92,7 @@ impl Handler<Call<Look>> for RosapiNode {
                 return;
             };
             let census = registry.send(TakeCensus).await.unwrap_or_default();
-            while reply.reserve(census.most_bytes()).is_err() {
+            while !reply.reserve(census.most_bytes()) {
                 sleep(ROOM_RETRY).await;
             }
             let list = move || reply.answer(Listing { look, census });

@@ -61,18 +61,14 @@ impl<'a> Fields<'a> {
         let mut read = self;
         let (fields, values) = (read.fields, &mut read.values);
         let refused = |reason: String| RejectedField::refused("args", &reason);
-        match args {
-            Arguments::Neither(args) => {
-                return Err(refused(mistyped("an object or an array", args.raw())));
-            }
-            Arguments::Object(args) => {
-                let raw = args.raw();
+        let raw = args.raw();
+        match raw.get().as_bytes().first() {
+            Some(b'{') => {
                 let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
                 json::members_into(raw.get(), &names, values)
                     .map_err(|_| refused(mistyped("an object", raw)))?;
             }
-            Arguments::Positional(args) => {
-                let raw = args.raw();
+            Some(b'[') => {
                 let entries = json::entries(raw, fields.len())
                     .ok_or_else(|| refused(mistyped("an array", raw)))?;
                 if entries.count > fields.len() {
@@ -82,6 +78,7 @@ impl<'a> Fields<'a> {
                     *value = Some(entry);
                 }
             }
+            _ => return Err(refused(mistyped("an object or an array", raw))),
         }
         Ok(read)
     }

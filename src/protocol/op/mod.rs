@@ -6,7 +6,6 @@
 //! both cases.
 
 pub mod fields;
-mod goal_status;
 mod reader;
 mod rejections;
 #[cfg(feature = "runtime")]
@@ -14,14 +13,11 @@ pub mod token;
 
 use std::time::Duration;
 
-use serde_json::value::RawValue;
-
 use super::messages::{ErrorForm, Level};
 pub use crate::protocol::limits::MAX_NAME;
 use crate::protocol::wire::fragments::Piece;
 use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::series::Series;
-pub use goal_status::GoalStatus;
 pub use reader::{OPS, read, read_start};
 
 /// Longest `throttle_rate`: a year; beyond it, a delivery is never due in a connection's lifetime.
@@ -211,6 +207,19 @@ pub struct ActionGoal {
     pub feedback: bool,
 }
 
+/// The final status of a goal, as in `action_msgs/msg/GoalStatus`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GoalStatus {
+    /// Never accepted.
+    Unknown = 0,
+    /// Reached.
+    Succeeded = 4,
+    /// Cancelled by a client.
+    Canceled = 5,
+    /// Replaced by another goal or ended by a reset.
+    Aborted = 6,
+}
+
 /// The kinds of names that a client can serve to others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Served {
@@ -266,36 +275,9 @@ pub enum ProviderOp {
     },
 }
 
-/// The arguments of a call.
-#[derive(Debug, Clone)]
-pub enum Arguments {
-    /// Fields by name; `{}` if `args` was absent or `null`.
-    Object(Payload),
-    /// Fields in documented order.
-    Positional(Payload),
-    /// Any other value. The node that serves the call refuses it, because some services echo their values even then.
-    Neither(Payload),
-}
-
-impl Arguments {
-    /// No arguments: `{}`.
-    #[must_use]
-    pub fn none() -> Self {
-        Self::Object(
-            RawValue::from_string("{}".to_owned())
-                .unwrap_or_default()
-                .into(),
-        )
-    }
-
-    /// The arguments, of any type.
-    #[must_use]
-    pub fn payload(&self) -> &Payload {
-        match self {
-            Self::Object(args) | Self::Positional(args) | Self::Neither(args) => args,
-        }
-    }
-}
+/// The arguments of a call: fields by name, or in documented order in an array; `{}` if they are absent or `null`. The
+/// node that serves the call refuses any other value, because some services echo their values even then.
+pub type Arguments = Payload;
 
 /// Why a frame is not a valid operation, and the form of the answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

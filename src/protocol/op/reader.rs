@@ -346,15 +346,8 @@ impl<'a> OpReader<'a> {
     }
 
     fn args(&self) -> Arguments {
-        let Some(args) = self.get("args").map(Payload::from) else {
-            return Arguments::none();
-        };
-        match args.get().as_bytes().first() {
-            Some(b'{') => Arguments::Object(args),
-            Some(b'[') => Arguments::Positional(args),
-            Some(b'n') => Arguments::none(),
-            _ => Arguments::Neither(args),
-        }
+        let args = self.get("args").filter(|args| args.get() != "null");
+        args.map_or_else(Payload::empty_object, Payload::from)
     }
 
     fn timeout(&self) -> Result<Option<Duration>, Problem> {

@@ -49,7 +49,7 @@ impl Registry {
                             from: origin.from,
                             service,
                             id: origin.id.as_ref(),
-                            args: call.args.payload(),
+                            args: &call.args,
                         });
                     }
                     let address = Address::new(service, call.service.into_boxed_str(), origin.id)
@@ -74,8 +74,7 @@ impl Registry {
         } else {
             let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
             let terms = |_: &str| RequestTerms::Call { deadline };
-            let encode =
-                |spelling: &str, id: &str| messages::call(spelling, id, call.args.payload());
+            let encode = |spelling: &str, id: &str| messages::call(spelling, id, &call.args);
             self.forward(
                 &origin,
                 Served::Service,
@@ -108,7 +107,7 @@ impl Registry {
                 wants_feedback: goal.feedback,
             };
             let type_name = goal.type_name.as_deref();
-            let args = goal.args.payload();
+            let args = &goal.args;
             let encode = |spelling: &str, id: &str| {
                 messages::action_goal(spelling, id, type_name, args, goal.feedback)
             };
@@ -261,7 +260,7 @@ impl Registry {
                 Served::Action => Refusal::NoAction(name.to_owned()),
             });
         };
-        if matches!(args, Arguments::Neither(_)) {
+        if !args.get().starts_with(['{', '[']) {
             return Err(Refusal::BadArguments);
         }
         let server = self.clients.get(&provider.connection);

@@ -126,8 +126,7 @@ impl<const N: usize> FrameGoal<N> {
 
 /// The id and the goal of a `tf2_web_republisher/TFSubscriptionActionGoal`.
 fn read_goal<const N: usize>(msg: &Payload) -> Result<(String, FrameGoal<N>), Rejections> {
-    let msg = Arguments::Object(msg.clone());
-    let mut fields = Fields::of_message(&msg, Topic::TfWebGoal)?;
+    let mut fields = Fields::of_message(msg, Topic::TfWebGoal)?;
     let id = fields.object("goal_id", |fields| {
         let id = fields.text("id").unwrap_or_default();
         if id.len() > MAX_NAME {
@@ -144,8 +143,7 @@ fn read_goal<const N: usize>(msg: &Payload) -> Result<(String, FrameGoal<N>), Re
 
 /// The id of an `actionlib_msgs/GoalID`, or none for all goals.
 fn read_cancel(msg: &Payload) -> Result<Option<String>, Rejections> {
-    let msg = Arguments::Object(msg.clone());
-    let mut fields = Fields::of_message(&msg, Topic::TfWebCancel)?;
+    let mut fields = Fields::of_message(msg, Topic::TfWebCancel)?;
     let id = fields.text("id").filter(|id| !id.is_empty());
     let id = id.map(Cow::into_owned);
     fields.accept(id)
