@@ -4,7 +4,6 @@
 //! **Invariant:** the fields of a type of ROS are those of its definition. Parts that nothing here uses are empty.
 
 use super::entry::{Constant, Field, Type, byte, fields, message};
-use super::types;
 
 /// The members of `params` in a request are the fields of `/arm_sim/set_params`.
 pub(super) const PARAMS: &[Field] = fields![
@@ -181,12 +180,3 @@ const HEALTH: &[Constant] = &[
     byte("ERROR", "2"),
     byte("STALE", "3"),
 ];
-
-impl Field {
-    /// The members of an object field of a request, a message or a response, in documented order; empty for every other
-    /// field.
-    #[must_use]
-    pub fn members(&self) -> &'static [Self] {
-        types::find(self.kind).map_or(&[], |one| one.fields)
-    }
-}
