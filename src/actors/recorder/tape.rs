@@ -10,10 +10,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::Instant;
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
+use super::clock::TapeClock;
 use super::limits::{FLUSH_PERIOD, MAX_RECORDS, MAX_WAITING_BYTES, MAX_WAITING_ENTRIES};
 use super::requests::{NotRecorded, Recorded};
 use crate::record::{Content, McapWriter, RecordEntry, RecordError, RunSettings};
@@ -46,29 +47,6 @@ type Waiting = (RecordEntry, OwnedSemaphorePermit);
 struct TapeCounts {
     dropped: AtomicU64,
     is_over: AtomicBool,
-}
-
-/// A clock of the time of day, for records only. It is read once and continued with a monotonic clock, so it never runs
-/// backwards.
-#[derive(Clone, Copy)]
-pub(super) struct TapeClock {
-    began: Instant,
-    since_1970: Duration,
-}
-
-impl TapeClock {
-    /// A clock that starts at the present time of day.
-    pub(super) fn start() -> Self {
-        let since_1970 = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
-        let began = Instant::now();
-        Self { began, since_1970 }
-    }
-
-    /// Nanoseconds since 1970.
-    pub(super) fn now(&self) -> u64 {
-        let now = self.since_1970 + self.began.elapsed();
-        u64::try_from(now.as_nanos()).unwrap_or(u64::MAX)
-    }
 }
 
 /// A started record.
