@@ -43,7 +43,11 @@ fn examine(input: &[u8]) {
     }
     let is_accepted = fields.accepted();
     let rejections = fields.finish();
-    let refused: Vec<&str> = rejections.as_slice().iter().map(|one| &*one.field).collect();
+    let refused: Vec<&str> = rejections
+        .as_slice()
+        .iter()
+        .map(|one| &*one.field)
+        .collect();
     assert_eq!(refused, model.refused, "{args:?}");
     assert_eq!(is_accepted, refused.is_empty());
     let status = rejections.status();

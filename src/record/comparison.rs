@@ -178,13 +178,12 @@ fn no_states(ending: Option<RecordEnding>) -> ReplayError {
 }
 
 fn first_input(recording: &mut Recording<impl Read>) -> Result<RecordedMessage, ReplayError> {
-    loop {
-        match recording.next_passage()? {
-            Some(passage) if passage.topic == INPUTS => return Ok(passage),
-            Some(_) => {}
-            None => return Err(no_states(recording.ending())),
+    while let Some(passage) = recording.next_passage()? {
+        if passage.topic == INPUTS {
+            return Ok(passage);
         }
     }
+    Err(no_states(recording.ending()))
 }
 
 fn play<const N: usize>(

@@ -299,11 +299,8 @@ impl<const N: usize> TfRepublisher<N> {
         due.sort_by_key(|(_, due)| *due);
         for (order, (subscription, due)) in (0..).zip(due.into_iter().take(AT_ONCE)) {
             // A nanosecond keeps the order, so requests that are always due take turns.
-            *due = next(
-                *due,
-                subscription.goal.period,
-                now + Duration::from_nanos(order),
-            );
+            let sent = now + Duration::from_nanos(order);
+            *due = next(*due, subscription.goal.period, sent);
             let message = seen(&subscription.goal.target, &subscription.goal.sources);
             match &subscription.by {
                 FrameReceiver::Client(client) => client.feed_back(message),

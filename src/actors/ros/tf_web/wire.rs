@@ -41,13 +41,8 @@ impl<const N: usize> TfRepublisher<N> {
             SubscribeFrames { goal, by }
         };
         nodes.listen(Topic::TfWebGoal, address.clone(), read_goal::<N>, subscribe);
-        let unsubscribe = |id, _| UnsubscribeFrames(id);
-        nodes.listen(
-            Topic::TfWebCancel,
-            address.clone(),
-            read_cancel,
-            unsubscribe,
-        );
+        let cancel = |id, _| UnsubscribeFrames(id);
+        nodes.listen(Topic::TfWebCancel, address.clone(), read_cancel, cancel);
         for topic in [Topic::TfWeb, Topic::TfWebFeedback] {
             nodes.publishers.insert(topic, address.clone().recipient());
         }
