@@ -28,8 +28,8 @@ fn examine(input: &[u8]) {
     let Some(args) = arguments(service, args) else {
         return;
     };
-    let Some(json) = Json::read(args.payload().get()) else {
-        panic!("accepted, and no JSON: {}", args.payload().get());
+    let Some(json) = Json::read(args.get()) else {
+        panic!("accepted, and no JSON: {}", args.get());
     };
     let Some(mut model) = Model::new(service, &json) else {
         let refusal = Fields::read(&args, service).expect_err("the other reading refuses it");
@@ -41,10 +41,16 @@ fn examine(input: &[u8]) {
         let how = How::new(field, seed);
         compare(&mut fields, &mut model, field, how);
     }
-    let refused: Vec<&str> = fields.rejections().iter().map(|one| &*one.field).collect();
+    let is_accepted = fields.accepted();
+    let rejections = fields.finish();
+    let refused: Vec<&str> = rejections
+        .as_slice()
+        .iter()
+        .map(|one| &*one.field)
+        .collect();
     assert_eq!(refused, model.refused, "{args:?}");
-    assert_eq!(fields.accepted(), refused.is_empty());
-    let status = fields.status();
+    assert_eq!(is_accepted, refused.is_empty());
+    let status = rejections.status();
     assert!(status.chars().count() <= 2049 && !status.contains(char::is_control));
     for name in refused {
         assert!(status.contains(name) || status.ends_with('…'), "{status}");

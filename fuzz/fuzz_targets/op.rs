@@ -112,7 +112,7 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
                 call.timeout,
                 timeout.map(|timeout| duration(timeout, MAX_TIMEOUT))
             );
-            let line = check_line(&messages::call(&call.service, "1", call.args.payload()));
+            let line = check_line(&messages::call(&call.service, "1", &call.args));
             let none = matches!(json.get("args"), None | Some(Json::Null));
             if !none {
                 check_passed_on(json.get("args"), line.get("args"));

@@ -14,7 +14,6 @@ use serde::Serialize;
 use tokio::sync::oneshot;
 
 use super::ConnectionId;
-use crate::actors::resources::memory::NoRoom;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::wire::json::Payload;
@@ -43,25 +42,16 @@ pub struct ShutDown(pub &'static str);
 
 /// Why a question has no answer. It has had no effect, and will have none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Unserved {
-    /// The node dropped it.
-    #[error("the node that serves this ended before it answered")]
-    Ended,
-    /// Another node that was needed has ended.
-    #[error("{0} does not answer")]
-    NoAnswer(
-        /// Its name.
-        &'static str,
-    ),
+#[error("{0}")]
+pub struct Unserved(pub &'static str);
+
+impl Unserved {
+    /// The node dropped the question.
+    pub const ENDED: Self = Self("the node that serves this ended before it answered");
+    /// The arm has ended.
+    pub const NO_ARM: Self = Self("arm_sim does not answer");
     /// The caller has disconnected.
-    #[error("the caller is gone")]
-    CallerGone,
-    /// Too many questions wait, or none is accepted.
-    #[error("{0}")]
-    Refused(
-        /// The reason.
-        &'static str,
-    ),
+    pub const CALLER_GONE: Self = Self("the caller is gone");
 }
 
 /// A guard of an op that has not yet taken effect: a call, a goal, or a message for its subscribers. The
@@ -88,12 +78,9 @@ pub trait Asker<T>: Send {
     /// Sends, before the answer, the reason why the request has no effect yet. For a node this is in the answer.
     fn warn(&self, _why: &str) {}
 
-    /// Reserves memory for an answer of at most `bytes` bytes before it is computed.
-    ///
-    /// # Errors
-    /// While there is not enough.
-    fn reserve(&mut self, _bytes: usize) -> Result<(), NoRoom> {
-        Ok(())
+    /// Reserves memory for an answer of at most `bytes` bytes before it is computed. `false` while there is not enough.
+    fn reserve(&mut self, _bytes: usize) -> bool {
+        true
     }
 }
 
@@ -123,15 +110,11 @@ impl<T> Reply<T> {
         self.asker.as_ref().is_some_and(|asker| asker.is_gone())
     }
 
-    /// Reserves memory for an answer of at most `bytes` bytes before it is computed. Short answers need no reservation.
-    ///
-    /// # Errors
-    /// While there is not enough.
-    pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
-        match &mut self.asker {
-            Some(asker) => asker.reserve(bytes),
-            None => Ok(()),
-        }
+    /// Reserves memory for an answer of at most `bytes` bytes before it is computed. `false` while there is not enough.
+    /// Short answers need no reservation.
+    pub fn reserve(&mut self, bytes: usize) -> bool {
+        let asker = self.asker.as_mut();
+        asker.is_none_or(|asker| asker.reserve(bytes))
     }
 
     /// Sends a client a status, before the answer, with the reason why the request has no effect yet.
@@ -168,7 +151,7 @@ impl<T> Reply<T> {
 impl<T> Drop for Reply<T> {
     fn drop(&mut self) {
         if self.asker.is_some() {
-            self.refuse(Unserved::Ended);
+            self.refuse(Unserved::ENDED);
         }
     }
 }
@@ -195,7 +178,7 @@ pub fn ask<A: Ask>(
     let (answered, answer) = oneshot::channel();
     let reply = Reply::new(answered, None);
     node.do_send(Call { ask, reply });
-    async move { answer.await.unwrap_or(Err(Unserved::Ended)) }
+    async move { answer.await.unwrap_or(Err(Unserved::ENDED)) }
 }
 
 // ---- between the registry and the nodes -----------------------------------------------------------------------------

@@ -9,7 +9,7 @@ use actix::prelude::*;
 use super::arm::follow::PathFollower;
 use super::arm::ik_action::{GoalTracker, IkAction};
 use super::arm::ik_trial::{GoalClient, IkTrial};
-use super::arm::sim::{AddBarrier, ArmPose, ArmSim, SetLimitPredictor};
+use super::arm::sim::{ArmPose, ArmSim, Connect};
 use super::compute::study::Study;
 use super::compute::workers::WorkerPool;
 use super::gateway::registry::Registry;
@@ -69,14 +69,18 @@ pub fn start_nodes<const N: usize>(
     TfRepublisher::attach(&frames, nodes);
     let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
     Study::attach(&study, nodes);
-    arm.do_send(SetLimitPredictor(study.recipient()));
     let follower = PathFollower::new(arm.clone().recipient(), arm.clone().recipient()).start();
     PathFollower::attach(&follower, nodes);
     let (pose, tracker) = (arm.clone().recipient(), GoalTracker::of(arm));
     let (action, _) = start_goal_nodes(pose, tracker, registry, seed, nodes);
-    arm.do_send(AddBarrier(registry.clone().recipient()));
-    arm.do_send(AddBarrier(action.clone().recipient()));
-    arm.do_send(AddBarrier(follower.clone().recipient()));
+    arm.do_send(Connect {
+        study: Some(study.recipient()),
+        owners: vec![
+            registry.clone().recipient(),
+            action.clone().recipient(),
+            follower.clone().recipient(),
+        ],
+    });
     vec![
         arm.clone().recipient(),
         action.recipient(),

@@ -8,10 +8,9 @@
 
 use std::cell::{Cell, RefCell};
 use std::fmt::Write as _;
-use std::future::Future;
+use std::future::poll_fn;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook};
-use std::pin::Pin;
-use std::task::{Context, Poll};
+use std::task::Poll;
 
 /// Longest part of a panic's message that is reported.
 const MAX_WORDS: usize = 200;
@@ -52,24 +51,16 @@ pub fn contain<T>(work: impl FnOnce() -> T) -> Result<T, Contained> {
 }
 
 /// The same for a task: each poll is contained.
-#[must_use]
-pub fn contained<F: Future>(task: F) -> Contain<F> {
-    Contain(Box::pin(task))
-}
-
-/// See [`contained`].
-pub struct Contain<F>(Pin<Box<F>>);
-
-impl<F: Future> Future for Contain<F> {
-    type Output = Result<F::Output, Contained>;
-
-    fn poll(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Self::Output> {
-        match contain(|| self.0.as_mut().poll(cx)) {
-            Ok(Poll::Pending) => Poll::Pending,
-            Ok(Poll::Ready(output)) => Poll::Ready(Ok(output)),
-            Err(panic) => Poll::Ready(Err(panic)),
-        }
-    }
+///
+/// # Errors
+/// The panic.
+pub async fn contained<F: Future>(task: F) -> Result<F::Output, Contained> {
+    let mut task = Box::pin(task);
+    poll_fn(|cx| match contain(|| task.as_mut().poll(cx)) {
+        Ok(polled) => polled.map(Ok),
+        Err(panic) => Poll::Ready(Err(panic)),
+    })
+    .await
 }
 
 /// One line: the place and the panic's message, escaped and shortened.

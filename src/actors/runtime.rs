@@ -27,7 +27,7 @@ use crate::actors::node::ShutDown;
 use crate::actors::nodes;
 use crate::actors::panics::contain;
 #[cfg(feature = "record")]
-use crate::actors::recorder::{self, EndRecord, NotRecorded, RecordTo, Recorder};
+use crate::actors::recorder::{self, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::priority::lower_priority;
 use crate::actors::ros::rosout::Rosout;
@@ -186,8 +186,6 @@ struct NodeEnds {
     busy: Vec<Recipient<ShutDown>>,
     #[cfg(feature = "record")]
     record: Recipient<RecordTo>,
-    #[cfg(feature = "record")]
-    end_record: Recipient<EndRecord>,
 }
 
 #[cfg(feature = "record")]
@@ -196,9 +194,9 @@ impl NodeEnds {
     async fn record(&self, options: &Options) -> Result<(), RunError> {
         let folder = options.record_dir.as_deref();
         folder.map(recorder::look_into).transpose()?;
-        if let Some(file) = &options.record
+        if options.record.is_some()
             // The recorder lives as long as the registry.
-            && let Ok(begun) = self.record.send(RecordTo(file.clone())).await
+            && let Ok(begun) = self.record.send(RecordTo(options.record.clone())).await
         {
             begun?;
         }
@@ -207,11 +205,8 @@ impl NodeEnds {
 
     /// Ends the record, if there is one, for a bounded time.
     async fn finish_record(&self) {
-        let _ = timeout_at(
-            Instant::now() + RECORD_TIME,
-            self.end_record.send(EndRecord),
-        )
-        .await;
+        let ended = self.record.send(RecordTo(None));
+        let _ = timeout_at(Instant::now() + RECORD_TIME, ended).await;
     }
 }
 
@@ -247,9 +242,7 @@ fn start_nodes<const N: usize>(
     NodeEnds {
         busy,
         #[cfg(feature = "record")]
-        record: recorder.clone().recipient(),
-        #[cfg(feature = "record")]
-        end_record: recorder.recipient(),
+        record: recorder.recipient(),
     }
 }
 

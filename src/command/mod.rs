@@ -21,11 +21,6 @@ use self::parameters::ParamVerb;
 use self::session::RuntimeOptions;
 use self::topic::TopicVerb;
 
-/// The end of each subject's help.
-const STATUS: &str = "\
-Exit status: 0 for success, 1 for a refusal (with its reason) or a failure, 2 for bad usage, 3 for no connection, a
-connection that ended, or no answer within --timeout.";
-
 /// The subjects of the commands, each with its verbs.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum CommandSubject {
@@ -45,13 +40,15 @@ Example:
   pendularm diagnostics || echo 'a part is not OK'
 
 It waits for one message of /diagnostics. A running arm sends one every second. The exit status is 1 if a part is not
-OK. With --json the message is one line.")]
+OK.")]
     Diagnostics(RuntimeOptions),
 }
 
 /// The verbs of a subject, and the address of the runtime.
 #[derive(Debug, Clone, PartialEq, Args)]
-#[command(after_help = STATUS)]
+#[command(after_help = "\
+Exit status: 0 for success, 1 for a refusal (with its reason) or a failure, 2 for bad usage, 3 for no connection, a
+connection that ended, or no answer within --timeout.")]
 pub struct Subject<V: Subcommand> {
     #[command(flatten)]
     runtime: RuntimeOptions,

@@ -9,17 +9,9 @@ use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
 use super::output::{CommandError, Outcome, plain, print};
-use super::session::{Session, member_of};
+use super::session::{Session, read_member};
 use super::values::read;
 use crate::protocol::catalog::{Rosapi, Service, Topic};
-use crate::protocol::ros::parameters::NO_SUCH;
-
-/// The topic of the diagnostics.
-const TOPIC: &str = Topic::Diagnostics.name();
-/// The levels of `diagnostic_msgs/msg/DiagnosticStatus`, by their numbers.
-const LEVELS: [&str; 4] = ["OK", "WARN", "ERROR", "STALE"];
-/// Width of the column of keys. All keys of the runtime fit.
-const KEY_WIDTH: usize = 24;
 
 /// The verbs of parameters.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
@@ -109,55 +101,30 @@ struct ParameterAnswer {
 async fn call(session: &mut Session, question: Rosapi, args: &Value) -> Outcome<ParameterAnswer> {
     let values = session.call(Service::Rosapi(question).name(), args).await?;
     let answer: ParameterAnswer = serde_json::from_str(values.get())?;
-    match answer.reason.as_str() {
-        _ if answer.successful => Ok(answer),
-        // The message names the command and the node.
-        NO_SUCH => Err(CommandError::Refused(format!(
-            "there is no parameter {}; `pendularm param list` lists all",
-            args["name"]
-        ))),
-        _ => Err(CommandError::Refused(answer.reason)),
+    match answer.successful {
+        true => Ok(answer),
+        false => Err(CommandError::Refused(answer.reason)),
     }
 }
 
 /// A part in a message of the diagnostics.
 #[derive(Deserialize)]
 struct DiagnosedPart {
-    level: usize,
+    level: u8,
     name: String,
     message: String,
-    values: Vec<Detail>,
-}
-
-#[derive(Deserialize)]
-struct Detail {
-    key: String,
-    value: String,
 }
 
 pub(super) async fn diagnostics(session: &mut Session) -> Outcome {
-    session.subscribe(TOPIC, None).await?;
-    let message = session.message(TOPIC).await?;
-    let status = member_of(&message, "status").map_or("null", RawValue::get);
-    let status: Vec<DiagnosedPart> = serde_json::from_str(status)?;
-    match session.is_json {
-        true => session.show(&message, "")?,
-        false => print(&status.iter().map(page).collect::<String>())?,
-    }
-    match status.iter().find(|part| part.level != 0) {
+    let topic = Topic::Diagnostics.name();
+    session.subscribe(topic, None).await?;
+    let message = session.message(topic).await?;
+    let status: Vec<DiagnosedPart> = read_member(&message, "status")?;
+    session.show(&message, "")?;
+    match status.into_iter().find(|part| part.level != 0) {
         None => Ok(()),
         Some(DiagnosedPart { name, message, .. }) => {
             Err(CommandError::Refused(format!("{name}: {message}")))
         }
     }
-}
-
-fn page(part: &DiagnosedPart) -> String {
-    let level = LEVELS.get(part.level).unwrap_or(&"STALE");
-    let mut page = plain(&format!("{level} {}: {}", part.name, part.message)) + "\n";
-    for Detail { key, value } in &part.values {
-        page += plain(&format!("  {key:KEY_WIDTH$}  {value}")).trim_end();
-        page.push('\n');
-    }
-    page
 }

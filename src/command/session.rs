@@ -116,6 +116,12 @@ pub(super) fn member_of<'a>(object: &'a RawValue, name: &str) -> Option<&'a RawV
     members.get(name).copied()
 }
 
+/// The member of an object, which must be of this type.
+pub(super) fn read_member<T: DeserializeOwned>(object: &RawValue, name: &str) -> Outcome<T> {
+    let value = member_of(object, name).map_or("null", RawValue::get);
+    Ok(serde_json::from_str(value)?)
+}
+
 impl RuntimeOptions {
     /// Connects. The first frame has the token and marks a command, which may use a kept place.
     pub(super) async fn open(&self) -> Outcome<Session> {
@@ -225,9 +231,7 @@ impl Session {
         args: &Value,
         member: &str,
     ) -> Outcome<T> {
-        let values = self.call(service, args).await?;
-        let value = member_of(&values, member).map_or("null", RawValue::get);
-        Ok(serde_json::from_str(value)?)
+        read_member(&self.call(service, args).await?, member)
     }
 
     /// The type of a topic, service or action; empty if it is unknown. A given type must be the same.

@@ -15,7 +15,7 @@ use yaml_rust2::{Yaml, YamlLoader};
 use super::output::{CommandError, Outcome};
 use crate::protocol::limits::MAX_NESTING;
 use crate::protocol::wire::json::string_end;
-use crate::protocol::wire::text::acts;
+use crate::protocol::wire::text::escape;
 
 /// Reads a value in JSON or YAML.
 ///
@@ -93,16 +93,8 @@ pub const WORDS: [&str; 10] = [
 /// JSON on one line, unchanged except for escaped control characters. YAML reads the escapes of its texts too.
 #[must_use]
 pub fn json_line(json: &str) -> String {
-    let mut line = String::with_capacity(json.len() + 1);
-    for character in json.chars() {
-        match character {
-            // These are between tokens. Inside a text JSON does not allow them.
-            '\t' | '\r' | '\n' => line.push(' '),
-            _ if acts(character) => line += &format!("\\u{:04x}", u32::from(character)),
-            _ => line.push(character),
-        }
-    }
-    line
+    // These are between tokens. Inside a text JSON does not allow them.
+    escape(&json.replace(['\t', '\r', '\n'], " "))
 }
 
 /// Writes the value as lines of YAML, and `end` after them. It writes while it reads, because a deeply nested value is

@@ -180,7 +180,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     }
 }
 
-fn header(stamp: Stamp) -> Header<'static> {
+fn header(stamp: Stamp) -> Header {
     Header {
         stamp,
         frame_id: WORLD,

@@ -8,7 +8,6 @@
 
 pub mod repeats;
 
-use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -24,7 +23,7 @@ use tracing_subscriber::fmt::{self, format::Writer, time::FormatTime, time::Syst
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
 
 use self::repeats::{PERIOD, Repeated, Repeats};
-use crate::protocol::wire::text::acts;
+use crate::protocol::wire::text::escape;
 
 /// Most lines in the queue: more than a burst of connections logs at the default level.
 pub const QUEUE_LINES: usize = 1024;
@@ -241,20 +240,6 @@ impl Write for Log {
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
-}
-
-/// The JSON syntax has no control character, so one of them is part of a text.
-fn escape(line: &str) -> String {
-    let mut escaped = String::with_capacity(line.len() + 1);
-    for character in line.chars() {
-        if acts(character) {
-            // Writing to a `String` cannot fail.
-            let _ = write!(escaped, "\\u{:04x}", u32::from(character));
-        } else {
-            escaped.push(character);
-        }
-    }
-    escaped
 }
 
 /// The first `most` bytes of a text, and a mark that it was cut.

@@ -160,36 +160,27 @@ Examples:
     },
 }
 
-/// Why the command line or the environment was refused, in one line.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct UsageError(String);
-
 /// The first paragraph of the error, in one line. Usage and hints follow it.
-impl From<clap::Error> for UsageError {
-    fn from(error: clap::Error) -> Self {
-        let report = error.to_string();
-        let first = report.split("\n\n").next().unwrap_or_default();
-        let first = first.strip_prefix("error: ").unwrap_or(first);
-        let words: Vec<&str> = first.split_whitespace().collect();
-        let hint = match error.kind() {
-            ErrorKind::ValueValidation | ErrorKind::InvalidValue => "",
-            _ => "; --help lists all commands and options",
-        };
-        Self(words.join(" ") + hint)
-    }
+fn refusal(error: &clap::Error) -> String {
+    let report = error.to_string();
+    let first = report.split("\n\n").next().unwrap_or_default();
+    let first = first.strip_prefix("error: ").unwrap_or(first);
+    let words: Vec<&str> = first.split_whitespace().collect();
+    let hint = match error.kind() {
+        ErrorKind::ValueValidation | ErrorKind::InvalidValue => "",
+        _ => "; --help lists all commands and options",
+    };
+    words.join(" ") + hint
 }
 
 impl Options {
     /// Reads the arguments, with the program's name first. An option that is not among them is read from its variable.
     ///
     /// # Errors
-    /// [`UsageError`] for the first invalid argument, option or variable.
-    pub fn parse<I, T>(arguments: I) -> Result<Parsed, UsageError>
-    where
-        I: IntoIterator<Item = T>,
-        T: Into<OsString>,
-    {
+    /// The refusal of the first invalid argument, option or variable, in one line.
+    pub fn parse(
+        arguments: impl IntoIterator<Item = impl Into<OsString>>,
+    ) -> Result<Parsed, String> {
         let words: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
         let begins = |word: &OsString, with: &[char]| word.to_string_lossy().starts_with(with);
         let is_command = |word: &&OsString| !begins(word, &['-']) && *word != "help";
@@ -200,16 +191,15 @@ impl Options {
                 None => options.checked().map(Box::new).map(Parsed::Serve),
                 Some(Parsed::Plan(plan)) => plan.checked().map(Parsed::Plan),
                 Some(command) => Ok(command),
-            }
-            .map_err(UsageError),
+            },
             #[cfg(feature = "cli")]
             Err(error)
                 if error.kind() == ErrorKind::UnknownArgument
                     && words.iter().any(|word| begins(word, &['{', '['])) =>
             {
-                Err(UsageError(UNQUOTED.to_owned()))
+                Err(UNQUOTED.to_owned())
             }
-            Err(error) if error.use_stderr() => Err(error.into()),
+            Err(error) if error.use_stderr() => Err(refusal(&error)),
             Err(shown) => Ok(Parsed::Show(shown.to_string())),
         }
     }

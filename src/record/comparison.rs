@@ -9,7 +9,7 @@ use std::io::Read;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::journal::{Note, NoteError, links, read_note};
+use super::journal::{Note, NoteError, links_and_version, read_note};
 use super::reader::{ReadError, RecordEnding, RecordedMessage, Recording};
 use super::schema::{INPUTS, STATES};
 use super::writer::VERSION;
@@ -157,11 +157,16 @@ impl fmt::Display for ReplayVerdict {
 pub fn replay(file: impl Read) -> Result<ReplayVerdict, ReplayError> {
     let mut recording = Recording::new(file);
     let first = first_input(&mut recording)?;
-    match links(&fields::<InputMessage>(&first)?.input) {
-        Some(2) => play::<2>(recording, first),
-        Some(3) => play::<3>(recording, first),
-        _ => Err(ReplayError::NoStates),
-    }
+    let begun = links_and_version(&fields::<InputMessage>(&first)?.input);
+    let mut verdict = match begun {
+        Some((2, _)) => play::<2>(recording, first)?,
+        Some((3, _)) => play::<3>(recording, first)?,
+        _ => return Err(ReplayError::NoStates),
+    };
+    let version = begun.map(|(_, version)| version);
+    let other = version.filter(|version| version != VERSION);
+    verdict.other_version = other.map(|version| version.chars().take(MAX_VERSION).collect());
+    Ok(verdict)
 }
 
 /// The error for a record without states, by its end.
@@ -173,13 +178,12 @@ fn no_states(ending: Option<RecordEnding>) -> ReplayError {
 }
 
 fn first_input(recording: &mut Recording<impl Read>) -> Result<RecordedMessage, ReplayError> {
-    loop {
-        match recording.next_passage()? {
-            Some(passage) if passage.topic == INPUTS => return Ok(passage),
-            Some(_) => {}
-            None => return Err(no_states(recording.ending())),
+    while let Some(passage) = recording.next_passage()? {
+        if passage.topic == INPUTS {
+            return Ok(passage);
         }
     }
+    Err(no_states(recording.ending()))
 }
 
 fn play<const N: usize>(
@@ -192,10 +196,6 @@ fn play<const N: usize>(
         taken: 0,
         verdict: ReplayVerdict {
             links: N,
-            other_version: recording
-                .version()
-                .filter(|version| *version != VERSION)
-                .map(|version| version.chars().take(MAX_VERSION).collect()),
             ..ReplayVerdict::default()
         },
     };
@@ -244,13 +244,9 @@ impl<const N: usize> Replay<N> {
             self.taken = 0;
             return Ok(());
         }
-        if !self.advance(step, passage)? {
-            return Ok(());
-        }
-        let Some((simulation, _)) = &mut self.arm else {
+        let Some(simulation) = self.advance(step, passage)? else {
             return Ok(());
         };
-        self.verdict.inputs += 1;
         match note {
             Note::Input(input) => simulation.apply(input),
             Note::Diverged if simulation.step() => {
@@ -261,16 +257,14 @@ impl<const N: usize> Replay<N> {
             }
             Note::Diverged | Note::Begin(_) => {}
         }
+        self.verdict.inputs += 1;
         Ok(())
     }
 
     fn state(&mut self, passage: &RecordedMessage) -> Result<(), ReplayError> {
         let recorded: StateMessage = fields(passage)?;
         let step = recorded.step;
-        if !self.advance(step, passage)? {
-            return Ok(());
-        }
-        let Some((simulation, _)) = &self.arm else {
+        let Some(simulation) = self.advance(step, passage)? else {
             return Ok(());
         };
         let state = simulation.state();
@@ -300,10 +294,14 @@ impl<const N: usize> Replay<N> {
         Ok(())
     }
 
-    /// Takes the steps up to that one. Returns `false` if nothing can be compared there.
-    fn advance(&mut self, step: u64, passage: &RecordedMessage) -> Result<bool, ReplayError> {
+    /// Takes the steps up to that one. Returns the simulation, unless nothing can be compared there.
+    fn advance(
+        &mut self,
+        step: u64,
+        passage: &RecordedMessage,
+    ) -> Result<Option<&mut Simulation<N>>, ReplayError> {
         let Some((simulation, at)) = &mut self.arm else {
-            return Ok(false);
+            return Ok(None);
         };
         let due = step.checked_sub(*at);
         let due = due.ok_or(ReplayError::Order { step, after: *at })?;
@@ -329,9 +327,9 @@ impl<const N: usize> Replay<N> {
                 at,
                 "the next step was finite in the record, but is not finite now",
             );
-            return Ok(false);
+            return Ok(None);
         }
-        Ok(true)
+        Ok(self.arm.as_mut().map(|(simulation, _)| simulation))
     }
 
     fn differs(&mut self, step: u64, what: &str) {

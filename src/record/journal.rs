@@ -1,4 +1,4 @@
-//! Inputs to the arm as text: one JSON value each. Its numbers are read back bit for bit.
+//! Inputs to the arm as text: one JSON object each, with one member. Its numbers are read back bit for bit.
 //!
 //! **Invariant:** finite numbers are read back unchanged. A note that does not fit the arm is refused.
 
@@ -9,6 +9,8 @@ use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::{ArmInput, Checkpoint, ControlPeriod, Held};
 use crate::protocol::wire::text::{excerpt, shortened};
+
+use super::writer::VERSION;
 
 /// Longest message of the parser \[characters\]. It may quote the file.
 const MAX_WORDS: usize = 200;
@@ -46,96 +48,43 @@ pub enum NoteError {
     Arm(#[from] ArmError),
 }
 
-// ---- writing --------------------------------------------------------------------------------------------------------
+// ---- notes ----------------------------------------------------------------------------------------------------------
 
 /// The note as text.
 #[must_use]
 pub fn write_note<const N: usize>(note: &Note<N>) -> String {
-    let written = match note {
-        Note::Begin(checkpoint) => json!({"begin": write_checkpoint(checkpoint)}),
-        Note::Diverged => json!("diverged"),
+    let (kind, value) = match note {
+        Note::Begin(simulation) => {
+            let simulation = simulation.write();
+            let begin = json!({"links": N, "version": VERSION, "simulation": simulation});
+            ("begin", begin)
+        }
+        Note::Diverged => ("diverged", Value::Null),
         Note::Input(input) => match input {
-            ArmInput::Method(method) => json!({"method": method.name()}),
-            ArmInput::Timestep(timestep) => json!({"timestep": timestep}),
-            ArmInput::Arm(arm) => json!({"params": write_arm(arm)}),
-            ArmInput::Gains(gains) => json!({"gains": write_gains(gains)}),
-            ArmInput::Enabled(on) => json!({"enable": on}),
-            ArmInput::Setpoint(Setpoint { position, velocity }) => {
-                json!({"setpoint": write_motion(position, velocity)})
-            }
-            ArmInput::Disturbance { effort, duration } => {
-                json!({"disturb": {"effort": effort.as_slice(), "duration": duration}})
-            }
-            ArmInput::Period(period) => json!({"period": write_period(period)}),
-            ArmInput::State(state) => json!({"state": write_state(state)}),
-            ArmInput::Command(effort) => json!({"command": effort.as_slice()}),
-            ArmInput::Drive(effort) => json!({"drive": effort.as_ref().map(<[f64; N]>::as_slice)}),
-            ArmInput::Reset => json!("reset"),
+            ArmInput::Method(method) => ("method", method.write()),
+            ArmInput::Timestep(timestep) => ("timestep", timestep.write()),
+            ArmInput::Arm(arm) => ("params", arm.write()),
+            ArmInput::Gains(gains) => ("gains", gains.write()),
+            ArmInput::Enabled(on) => ("enable", on.write()),
+            ArmInput::Setpoint(setpoint) => ("setpoint", setpoint.write()),
+            ArmInput::Disturbance { effort, duration } => ("disturb", (*effort, *duration).write()),
+            ArmInput::Period(period) => ("period", period.write()),
+            ArmInput::State(state) => ("state", state.write()),
+            ArmInput::Command(effort) => ("command", effort.write()),
+            ArmInput::Drive(effort) => ("drive", effort.write()),
+            ArmInput::Reset => ("reset", Value::Null),
         },
     };
-    written.to_string()
+    json!({ kind: value }).to_string()
 }
 
-fn write_checkpoint<const N: usize>(from: &Checkpoint<N>) -> Value {
-    let held = &from.held;
-    let disturbance = from.disturbance.as_ref();
-    json!({
-        "links": N,
-        "params": write_arm(&from.arm),
-        "gains": write_gains(&from.gains),
-        "setpoint": write_motion(&from.setpoint.position, &from.setpoint.velocity),
-        "integral": from.integral.as_slice(),
-        "enabled": from.enabled,
-        "held": {
-            "period": write_period(&held.period),
-            "due": held.due,
-            "effort": held.effort.as_slice(),
-            "computed": held.computed.as_slice(),
-            "command": held.command.as_slice(),
-            "driven": held.driven.as_ref().map(<[f64; N]>::as_slice),
-        },
-        "method": from.method.name(),
-        "timestep": from.timestep,
-        "state": write_state(&from.state),
-        "carry": write_state(&from.carry),
-        "effort": from.effort.as_slice(),
-        "disturbance": disturbance.map(|(effort, ends)| (effort.as_slice(), ends)),
-        "base": from.base,
-        "steps_since_base": from.steps_since_base,
-        "steps": from.steps,
-        "divergence": from.divergence,
-    })
-}
-
-fn write_arm<const N: usize>(arm: &Arm<N>) -> Value {
-    let (masses, lengths) = (arm.masses().as_slice(), arm.lengths().as_slice());
-    json!({"gravity": arm.gravity(), "masses": masses, "lengths": lengths})
-}
-
-fn write_gains<const N: usize>(gains: &Gains<N>) -> Value {
-    let [kp, ki, kd] = [&gains.kp, &gains.ki, &gains.kd].map(<[f64; N]>::as_slice);
-    json!({"kp": kp, "ki": ki, "kd": kd})
-}
-
-fn write_period(ControlPeriod { period, delay }: &ControlPeriod) -> Value {
-    json!({"period": period, "delay": delay})
-}
-
-fn write_state<const N: usize>(state: &State<N>) -> Value {
-    write_motion(&state.position, &state.velocity)
-}
-
-fn write_motion(position: &[f64], velocity: &[f64]) -> Value {
-    json!({"position": position, "velocity": velocity})
-}
-
-// ---- reading --------------------------------------------------------------------------------------------------------
-
-/// The number of links in a note with the whole simulation; `None` for any other note.
+/// The number of links and the program's version, in a note with the whole simulation; `None` for any other note.
 #[must_use]
-pub fn links(note: &str) -> Option<u64> {
+pub(super) fn links_and_version(note: &str) -> Option<(u64, String)> {
     let note: Value = serde_json::from_str(note).ok()?;
-    note.pointer("/begin/links")?.as_u64()
+    let version = note.pointer("/begin/version")?.as_str()?;
+    let links = note.pointer("/begin/links")?.as_u64()?;
+    Some((links, version.to_owned()))
 }
 
 /// Reads a note.
@@ -144,155 +93,148 @@ pub fn links(note: &str) -> Option<u64> {
 /// If it is not a note, or not for an arm of `N` links.
 pub fn read_note<const N: usize>(note: &str) -> Result<Note<N>, NoteError> {
     let note: Value = serde_json::from_str(note)?;
-    let members = note.as_object().filter(|members| members.len() == 1);
-    let (kind, value) = match members.and_then(|members| members.iter().next()) {
-        Some((kind, value)) => (kind.as_str(), value),
-        None => (note.as_str().unwrap_or_default(), &Value::Null),
+    let mut members = note.as_object().into_iter().flatten();
+    let (Some((kind, value)), None) = (members.next(), members.next()) else {
+        return Err(NoteError::Kind(note.to_string()));
     };
-    Ok(Note::Input(match kind {
-        "begin" => return Ok(Note::Begin(Box::new(read_checkpoint(value)?))),
+    Ok(Note::Input(match kind.as_str() {
+        "begin" => {
+            let simulation = Noted::read("begin", &value["simulation"])?;
+            return Ok(Note::Begin(Box::new(simulation)));
+        }
         "diverged" => return Ok(Note::Diverged),
-        "method" => ArmInput::Method(read_method(value)?),
-        "timestep" => ArmInput::Timestep(timestep(value)?),
-        "params" => ArmInput::Arm(read_arm(value)?),
-        "gains" => ArmInput::Gains(read_gains(value)?),
-        "enable" => ArmInput::Enabled(flag("enable", value)?),
-        "setpoint" => ArmInput::Setpoint(read_setpoint(value)?),
-        "disturb" => ArmInput::Disturbance {
-            effort: array("effort", &value["effort"])?,
-            duration: number("duration", &value["duration"])?,
-        },
-        "period" => ArmInput::Period(read_period(value)?),
-        "state" => ArmInput::State(read_state(value)?),
-        "command" => ArmInput::Command(array("command", value)?),
-        "drive" => ArmInput::Drive(optional(value, |value| array("drive", value))?),
+        "method" => ArmInput::Method(Noted::read("method", value)?),
+        "timestep" => ArmInput::Timestep(Noted::read("timestep", value)?),
+        "params" => ArmInput::Arm(Noted::read("params", value)?),
+        "gains" => ArmInput::Gains(Noted::read("gains", value)?),
+        "enable" => ArmInput::Enabled(Noted::read("enable", value)?),
+        "setpoint" => ArmInput::Setpoint(Noted::read("setpoint", value)?),
+        "disturb" => {
+            let (effort, duration) = Noted::read("disturb", value)?;
+            ArmInput::Disturbance { effort, duration }
+        }
+        "period" => ArmInput::Period(Noted::read("period", value)?),
+        "state" => ArmInput::State(Noted::read("state", value)?),
+        "command" => ArmInput::Command(Noted::read("command", value)?),
+        "drive" => ArmInput::Drive(Noted::read("drive", value)?),
         "reset" => ArmInput::Reset,
         other => return Err(NoteError::Kind(other.to_owned())),
     }))
 }
 
-fn read_checkpoint<const N: usize>(from: &Value) -> Result<Checkpoint<N>, NoteError> {
-    let held = optional(&from["held"], read_held)?;
-    Ok(Checkpoint {
-        arm: read_arm(&from["params"])?,
-        gains: read_gains(&from["gains"])?,
-        setpoint: read_setpoint(&from["setpoint"])?,
-        integral: array("integral", &from["integral"])?,
-        enabled: flag("enabled", &from["enabled"])?,
-        held: held.unwrap_or_default(),
-        method: read_method(&from["method"])?,
-        timestep: timestep(&from["timestep"])?,
-        state: read_state(&from["state"])?,
-        carry: read_state(&from["carry"])?,
-        effort: array("effort", &from["effort"])?,
-        disturbance: optional(&from["disturbance"], |one| {
-            Ok((
-                array("disturbance", &one[0])?,
-                number("disturbance", &one[1])?,
-            ))
-        })?,
-        base: number("base", &from["base"])?,
-        steps_since_base: steps("steps_since_base", &from["steps_since_base"])?,
-        steps: steps("steps", &from["steps"])?,
-        divergence: optional(&from["divergence"], |one| {
-            Ok((
-                steps("divergence", &one[0])?,
-                number("divergence", &one[1])?,
-            ))
-        })?,
-    })
+// ---- the values in them ---------------------------------------------------------------------------------------------
+
+/// A value in a note.
+trait Noted: Sized {
+    fn write(&self) -> Value;
+
+    /// Reads the value of the field `name`.
+    fn read(name: &'static str, from: &Value) -> Result<Self, NoteError>;
 }
 
-fn read_held<const N: usize>(from: &Value) -> Result<Held<N>, NoteError> {
-    Ok(Held {
-        period: read_period(&from["period"])?,
-        due: steps("due", &from["due"])?,
-        effort: array("effort", &from["effort"])?,
-        computed: array("computed", &from["computed"])?,
-        command: array("command", &from["command"])?,
-        driven: optional(&from["driven"], |value| array("driven", value))?,
-    })
+/// An object with the fields of a structure, each written and read by its type.
+macro_rules! noted {
+    ($([$($n:tt)*] $structure:ty { $($field:ident),* })*) => {$(
+        impl<$($n)*> Noted for $structure {
+            fn write(&self) -> Value {
+                json!({$(stringify!($field): self.$field.write()),*})
+            }
+
+            fn read(_: &'static str, from: &Value) -> Result<Self, NoteError> {
+                Ok(Self {$($field: Noted::read(stringify!($field), &from[stringify!($field)])?),*})
+            }
+        }
+    )*};
 }
 
-fn read_arm<const N: usize>(from: &Value) -> Result<Arm<N>, NoteError> {
-    let lengths = array("lengths", &from["lengths"])?;
-    let masses = array("masses", &from["masses"])?;
-    Ok(Arm::new(
-        lengths,
-        masses,
-        number("gravity", &from["gravity"])?,
-    )?)
+noted! {
+    [const N: usize] Checkpoint<N> {
+        arm, gains, setpoint, integral, enabled, held, method, timestep, state, carry, effort, disturbance, base,
+        steps_since_base, steps, divergence
+    }
+    [const N: usize] Held<N> { period, due, effort, computed, command, driven }
+    [const N: usize] Gains<N> { kp, ki, kd }
+    [const N: usize] Setpoint<N> { position, velocity }
+    [const N: usize] State<N> { position, velocity }
+    [] ControlPeriod { period, delay }
 }
 
-fn read_gains<const N: usize>(from: &Value) -> Result<Gains<N>, NoteError> {
-    Ok(Gains {
-        kp: array("kp", &from["kp"])?,
-        ki: array("ki", &from["ki"])?,
-        kd: array("kd", &from["kd"])?,
-    })
+impl<const N: usize> Noted for Arm<N> {
+    fn write(&self) -> Value {
+        let (masses, lengths) = (self.masses().write(), self.lengths().write());
+        json!({"gravity": self.gravity(), "masses": masses, "lengths": lengths})
+    }
+
+    fn read(_: &'static str, from: &Value) -> Result<Self, NoteError> {
+        let lengths = Noted::read("lengths", &from["lengths"])?;
+        let masses = Noted::read("masses", &from["masses"])?;
+        let gravity = Noted::read("gravity", &from["gravity"])?;
+        Ok(Self::new(lengths, masses, gravity)?)
+    }
 }
 
-fn read_period(from: &Value) -> Result<ControlPeriod, NoteError> {
-    let period = number("period", &from["period"])?;
-    let delay = flag("delay", &from["delay"])?;
-    let why = NoteError::Field("the control period", "not be negative");
-    (period >= 0.0)
-        .then_some(ControlPeriod { period, delay })
-        .ok_or(why)
+impl Noted for Method {
+    fn write(&self) -> Value {
+        self.name().into()
+    }
+
+    fn read(name: &'static str, from: &Value) -> Result<Self, NoteError> {
+        let found = Self::ALL.into_iter().find(|one| *from == one.name());
+        found.ok_or(NoteError::Field(name, "be the name of a method"))
+    }
 }
 
-fn read_state<const N: usize>(from: &Value) -> Result<State<N>, NoteError> {
-    Ok(State {
-        position: array("position", &from["position"])?,
-        velocity: array("velocity", &from["velocity"])?,
-    })
+impl<T: Noted> Noted for Option<T> {
+    fn write(&self) -> Value {
+        self.as_ref().map_or(Value::Null, T::write)
+    }
+
+    fn read(name: &'static str, from: &Value) -> Result<Self, NoteError> {
+        let value = Some(from).filter(|value| !value.is_null());
+        value.map(|value| T::read(name, value)).transpose()
+    }
 }
 
-fn read_setpoint<const N: usize>(from: &Value) -> Result<Setpoint<N>, NoteError> {
-    let State { position, velocity } = read_state(from)?;
-    Ok(Setpoint { position, velocity })
+impl<A: Noted, B: Noted> Noted for (A, B) {
+    fn write(&self) -> Value {
+        json!([self.0.write(), self.1.write()])
+    }
+
+    fn read(name: &'static str, from: &Value) -> Result<Self, NoteError> {
+        Ok((A::read(name, &from[0])?, B::read(name, &from[1])?))
+    }
 }
 
-fn read_method(from: &Value) -> Result<Method, NoteError> {
-    let found = Method::ALL.into_iter().find(|one| *from == one.name());
-    found.ok_or(NoteError::Field("method", "be the name of a method"))
+impl<const N: usize> Noted for [f64; N] {
+    fn write(&self) -> Value {
+        self.as_slice().into()
+    }
+
+    fn read(name: &'static str, from: &Value) -> Result<Self, NoteError> {
+        let values = from.as_array().and_then(|values| {
+            let numbers = values.iter().map(Value::as_f64);
+            numbers.collect::<Option<Vec<_>>>()?.try_into().ok()
+        });
+        values.ok_or(NoteError::Field(name, "have one number per joint"))
+    }
 }
 
-/// The value, if it is not `null`.
-fn optional<T>(
-    value: &Value,
-    read: impl FnOnce(&Value) -> Result<T, NoteError>,
-) -> Result<Option<T>, NoteError> {
-    Some(value)
-        .filter(|value| !value.is_null())
-        .map(read)
-        .transpose()
+macro_rules! noted_scalars {
+    ($($scalar:ty: $read:expr, $rule:literal;)*) => {$(
+        impl Noted for $scalar {
+            fn write(&self) -> Value {
+                (*self).into()
+            }
+
+            fn read(name: &'static str, from: &Value) -> Result<Self, NoteError> {
+                $read(from).ok_or(NoteError::Field(name, $rule))
+            }
+        }
+    )*};
 }
 
-fn array<const N: usize>(name: &'static str, values: &Value) -> Result<[f64; N], NoteError> {
-    let values = values.as_array().and_then(|values| {
-        let numbers = values.iter().map(Value::as_f64);
-        numbers.collect::<Option<Vec<_>>>()?.try_into().ok()
-    });
-    values.ok_or(NoteError::Field(name, "have one number per joint"))
-}
-
-fn number(name: &'static str, value: &Value) -> Result<f64, NoteError> {
-    value.as_f64().ok_or(NoteError::Field(name, "be a number"))
-}
-
-fn flag(name: &'static str, value: &Value) -> Result<bool, NoteError> {
-    value
-        .as_bool()
-        .ok_or(NoteError::Field(name, "be true or false"))
-}
-
-fn timestep(value: &Value) -> Result<f64, NoteError> {
-    let timestep = value.as_f64().filter(|timestep| *timestep > 0.0);
-    timestep.ok_or(NoteError::Field("the timestep", "be greater than 0"))
-}
-
-fn steps(name: &'static str, value: &Value) -> Result<u64, NoteError> {
-    let steps = value.as_u64().filter(|steps| *steps <= MAX_STEPS);
-    steps.ok_or(NoteError::Field(name, "be at most 2^53"))
+noted_scalars! {
+    f64: Value::as_f64, "be a number";
+    bool: Value::as_bool, "be true or false";
+    u64: |from: &Value| from.as_u64().filter(|steps| *steps <= MAX_STEPS), "be at most 2^53";
 }

@@ -4,26 +4,20 @@
 //! A message with another definition is skipped.
 
 use std::collections::HashMap;
-use std::io::{self, Chain, Cursor, Read};
+use std::io::{self, Read};
 
+use mcap::McapError;
 use mcap::io::MessageReader;
-use mcap::records::{Record, op};
 use mcap::sans_io::LinearReaderOptions;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
-use mcap::{McapError, parse_record};
 use serde_json::Value;
 
 use super::schema::{CALL, INPUT, STATE};
-use super::writer::{FACTS, VERSION_KEY};
 use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::ros::cdr_reader::{self, CdrError};
 use crate::protocol::wire::text::{excerpt, shortened};
 
 /// Longest chunk that is read. Longer ones are never written.
 pub(super) const MAX_CHUNK: usize = 16 * 1024 * 1024;
-
-/// Bytes at the beginning of a file that are searched for the version.
-const HEAD: usize = 4096;
 
 /// A message of the record.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,8 +71,7 @@ impl From<McapError> for ReadError {
 
 /// A reader of a record.
 pub struct Recording<R> {
-    reader: MessageReader<Chain<Cursor<Vec<u8>>, R>>,
-    version: Option<String>,
+    reader: MessageReader<R>,
     /// The type of each schema id, if its definition is known.
     known: HashMap<u16, Option<Type>>,
     ending: Option<RecordEnding>,
@@ -86,16 +79,12 @@ pub struct Recording<R> {
 
 impl<R: Read> Recording<R> {
     /// A reader of this file.
-    pub fn new(mut file: R) -> Self {
-        let mut head = Vec::new();
-        // The first message reports an error of the file again.
-        let _ = file.by_ref().take(HEAD as u64).read_to_end(&mut head);
+    pub fn new(file: R) -> Self {
         let options = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
             .with_record_length_limit(MAX_CHUNK);
         Self {
-            version: version(&head),
-            reader: MessageReader::new_with_options(Cursor::new(head).chain(file), options),
+            reader: MessageReader::new_with_options(file, options),
             known: HashMap::new(),
             ending: None,
         }
@@ -139,41 +128,10 @@ impl<R: Read> Recording<R> {
         }))
     }
 
-    /// The version of the program that wrote the file, with its commit if known.
-    #[must_use]
-    pub fn version(&self) -> Option<&str> {
-        self.version.as_deref()
-    }
-
     /// How the file ended; `None` before its end.
     #[must_use]
     pub fn ending(&self) -> Option<RecordEnding> {
         self.ending
-    }
-}
-
-/// The version in the metadata at the start of a record.
-fn version(mut head: &[u8]) -> Option<String> {
-    let options = LinearReaderOptions::default().with_record_length_limit(HEAD);
-    let mut reader = LinearReader::new_with_options(options);
-    loop {
-        match reader.next_event()?.ok()? {
-            LinearReadEvent::ReadRequest(need) => {
-                let read = head.read(reader.insert(need)).ok()?;
-                if read == 0 {
-                    return None;
-                }
-                reader.notify_read(read);
-            }
-            LinearReadEvent::Record { data, opcode } if opcode == op::METADATA => {
-                if let Ok(Record::Metadata(facts)) = parse_record(opcode, data)
-                    && facts.name == FACTS
-                {
-                    return facts.metadata.get(VERSION_KEY).cloned();
-                }
-            }
-            LinearReadEvent::Record { .. } => {}
-        }
     }
 }
 

@@ -25,9 +25,8 @@ pub const CHUNK_BYTES: u64 = 64 * 1024;
 
 /// This program's version, with its commit if known.
 pub(super) const VERSION: &str = env!("PENDULARM_VERSION");
-/// The metadata record with facts about the run, and its member for the version.
-pub(super) const FACTS: &str = env!("CARGO_PKG_NAME");
-pub(super) const VERSION_KEY: &str = "version";
+/// The metadata record with facts about the run.
+const FACTS: &str = env!("CARGO_PKG_NAME");
 /// The channel metadata in which rosbag2 stores the quality of service.
 const QOS_KEY: &str = "offered_qos_profiles";
 
@@ -107,7 +106,7 @@ impl<W: Write> McapWriter<W> {
             .disable_seeking(true);
         let mut writer = options.create(NoSeek::new(file))?;
         let facts = [
-            (VERSION_KEY, VERSION.to_owned()),
+            ("version", VERSION.to_owned()),
             ("links", settings.links.to_string()),
             ("seed", settings.seed.to_string()),
         ];

@@ -11,9 +11,10 @@ use crate::math::pid::Setpoint;
 use crate::math::trajectory::{Tolerance, Waypoint};
 use crate::protocol::catalog::Action;
 use crate::protocol::op::Arguments;
-use crate::protocol::op::fields::{Bound, Fields, Reason, RejectedField, Rejections, finite};
+use crate::protocol::op::fields::{
+    self, Bound, Fields, MISSING, RejectedField, Rejections, finite, too_many, wrong_length,
+};
 use crate::protocol::wire::json::{self, Entries, Payload};
-use crate::protocol::wire::text;
 
 /// Most points of a path: more than a planner needs for a few joints. Each takes a hundred bytes while the goal is
 /// active.
@@ -45,9 +46,15 @@ pub fn read_setpoint<const N: usize>(msg: &Payload) -> Result<Setpoint<N>, Rejec
     let names = names.and_then(|names| json::entries(names, N));
 
     let field = format!("{field}.positions");
+    let count = positions.and_then(|raw| Some(json::entries(raw, 0)?.count));
+    let names_of_another_length = names
+        .as_ref()
+        .filter(|_| count.is_some_and(|count| count != N));
     let position = required(positions, &field)
         .and_then(|raw| numbers(raw, &field))
-        .map_err(|rejection| with_missing_joints(rejection, names.as_ref(), &joint_names::<N>()))?;
+        .map_err(|rejection| {
+            with_missing_joints(rejection, names_of_another_length, &joint_names::<N>())
+        })?;
     let velocity = velocities.and_then(|raw| numbers(raw, "velocities").ok());
     let order = names.and_then(|names| order(&names));
     let order = order.unwrap_or_else(|| std::array::from_fn(|joint| joint));
@@ -68,15 +75,14 @@ fn with_missing_joints(
         let named = names.first.iter().map(|name| json::text(name));
         named.collect::<Option<Vec<_>>>()
     });
-    if let (Reason::Length { .. }, Some(named)) = (&rejection.reason, named)
+    if let Some(named) = named
         && named.iter().all(|name| joints.contains(&&**name))
     {
         let is_missing = |joint: &&&str| !named.iter().any(|name| name == **joint);
         let missing: Vec<&str> = joints.iter().filter(is_missing).copied().collect();
         if !missing.is_empty() {
             let missing = missing.join(", ");
-            let reason = format!("{}: joint_names lacks {missing}", rejection.reason);
-            rejection.reason = Reason::Refused(reason);
+            rejection.reason += &format!(": joint_names lacks {missing}");
         }
     }
     rejection
@@ -138,8 +144,8 @@ fn points<const N: usize>(trajectory: &RawValue) -> Result<Vec<Waypoint<N>>, Rej
     let entries =
         json::entries(points, MAX_POINTS).ok_or_else(|| mistyped(field, "an array", points))?;
     if entries.count > MAX_POINTS {
-        let (limit, got) = (MAX_POINTS, entries.count);
-        return Err(rejected(field, Reason::TooMany { limit, got }));
+        let reason = too_many(MAX_POINTS, entries.count);
+        return Err(RejectedField::refused(field, &reason));
     }
     let indexed = entries.first.into_iter().enumerate();
     indexed
@@ -226,18 +232,12 @@ fn tolerance<const N: usize>(
 
 // ---- parts ----------------------------------------------------------------------------------------------------------
 
-fn rejected(field: &str, reason: Reason) -> RejectedField {
-    let field = field.to_owned();
-    RejectedField { field, reason }
-}
-
-fn mistyped(field: &str, expected: &'static str, raw: &RawValue) -> RejectedField {
-    let (expected, found) = (expected.into(), text::found(raw));
-    rejected(field, Reason::Mistyped { expected, found })
+fn mistyped(field: &str, expected: &str, raw: &RawValue) -> RejectedField {
+    RejectedField::refused(field, &fields::mistyped(expected, raw))
 }
 
 fn required<'a>(raw: Option<&'a RawValue>, field: &str) -> Result<&'a RawValue, RejectedField> {
-    raw.ok_or_else(|| rejected(field, Reason::Missing))
+    raw.ok_or_else(|| RejectedField::refused(field, &MISSING))
 }
 
 /// The members of these names in an object.
@@ -251,26 +251,24 @@ fn members<'a, const M: usize>(
 
 fn number_or_zero(raw: Option<&RawValue>, field: &str, bound: Bound) -> Result<f64, RejectedField> {
     raw.map_or(Ok(0.0), |raw| finite(raw, bound))
-        .map_err(|reason| rejected(field, reason))
+        .map_err(|reason| RejectedField::refused(field, &reason))
 }
 
 /// An array of `N` finite numbers.
 fn numbers<const N: usize>(raw: &RawValue, field: &str) -> Result<[f64; N], RejectedField> {
     let entries =
         json::entries(raw, N).ok_or_else(|| mistyped(field, "an array of numbers", raw))?;
-    let length = Reason::Length {
-        expected: N,
-        got: entries.count,
-    };
     let number = |(at, raw): (usize, &RawValue)| {
-        finite(raw, Bound::Finite).map_err(|reason| rejected(&format!("{field}[{at}]"), reason))
+        let refused = |reason| RejectedField::refused(&format!("{field}[{at}]"), &reason);
+        finite(raw, Bound::Finite).map_err(refused)
     };
+    let length = || RejectedField::refused(field, &wrong_length(N, entries.count));
     if entries.count != N {
-        return Err(rejected(field, length));
+        return Err(length());
     }
-    let numbers = entries.first.into_iter().enumerate().map(number);
+    let numbers = entries.first.iter().copied().enumerate().map(number);
     let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
-    numbers.try_into().map_err(|_| rejected(field, length))
+    numbers.try_into().map_err(|_| length())
 }
 
 /// The index in the message of each joint of the arm; `None` unless `names` has each joint once.

@@ -15,7 +15,7 @@ use pendularm::actors::arm::ik_action::{
     CancelRejected, CancelRequest, GoalRejected, GoalReport, IkAction, SendGoal,
 };
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, TrialRequest};
-use pendularm::actors::arm::sim::{ArmPose, Pose};
+use pendularm::actors::arm::sim::{ArmPose, GoalProgress, Pose};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::node::Barrier;
 use pendularm::actors::node::{Call, Interest};
@@ -25,6 +25,7 @@ use pendularm::math::kinematics::{Target, Unreachable};
 use pendularm::math::trial::Changes;
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::op::fields::Rejections;
+use pendularm::services::goals::AcceptedGoal;
 use serde_json::Value;
 use tokio::sync::mpsc::unbounded_channel;
 use tokio::time::Instant;
@@ -81,12 +82,19 @@ impl Script {
 
 /// The report that the first goal was reached at this time.
 fn reached_at(time: f64) -> GoalReport<2> {
+    let target = Target {
+        position: glam::DVec2::X,
+        orientation: None,
+    };
     GoalReport {
-        goal_id: "goal-1".to_owned(),
-        distance: 0.0,
-        positions: [0.0, 0.0],
-        pose: pose_at(time),
-        outcome: Some(Outcome::Reached),
+        goal: AcceptedGoal::new(1, target, [0.0, 0.0]),
+        progress: GoalProgress {
+            number: 1,
+            distance: 0.0,
+            elapsed: 0.0,
+            pose: pose_at(time),
+            outcome: Some(Outcome::Reached),
+        },
     }
 }
 

@@ -62,7 +62,7 @@ fn the_end_of_the_pool_refuses_running_waiting_and_new_tasks() {
         for call in calls {
             refused.push(bench.next().await);
             let answer = call.answer.await.unwrap();
-            assert!(matches!(answer, Err(Unserved::Refused("shutting down"))));
+            assert!(matches!(answer, Err(Unserved("shutting down"))));
         }
         refused.sort_unstable();
         assert_eq!(refused, [1, 2, 3, 4, 5, 6]);

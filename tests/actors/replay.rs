@@ -59,7 +59,7 @@ fn a_step_that_no_arm_has_come_to_is_refused_with_the_message() {
     }
     // So is an input.
     let mut lies = entries;
-    lies.push(input(u64::MAX, "\"reset\"", lies.len() as u64));
+    lies.push(input(u64::MAX, "{\"reset\":null}", lies.len() as u64));
     let why = refused(&lies).to_string();
     assert!(why.starts_with("/recorder/inputs, message "), "{why}");
 }

@@ -5,7 +5,7 @@ use std::cell::Cell;
 use std::net::SocketAddr;
 use std::rc::Rc;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use actix::prelude::*;
 use pendularm::actors::compute::workers::{Computation, Progress, WorkerPool};
@@ -150,7 +150,7 @@ impl World {
 struct Trap;
 
 impl Computation for Trap {
-    fn advance(&mut self, _: Instant) -> Progress {
+    fn advance(&mut self, _: Duration) -> Progress {
         panic!("{MEANT}")
     }
 

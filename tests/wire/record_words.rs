@@ -63,6 +63,33 @@ fn a_difference_is_reported_with_its_step_and_by_the_exit_status() {
 }
 
 #[test]
+fn a_record_of_another_version_is_replayed_with_a_note() {
+    let folder = Folder::new("record-version");
+    let file = folder.join("run.mcap");
+    record(&file);
+    assert!(!run(&["replay", text(&file)]).1.contains("note:"));
+    let mut begin: Value = serde_json::from_str(&beginning(&file)).unwrap();
+    let simulation = begin["begin"]["simulation"].clone();
+    let numbers = |values: &Value| serde_json::from_value(values.clone()).unwrap();
+    let state = Content::State {
+        step: 0,
+        position: numbers(&simulation["state"]["position"]),
+        velocity: numbers(&simulation["state"]["velocity"]),
+        effort: numbers(&simulation["effort"]),
+    };
+    let ours = env!("PENDULARM_VERSION");
+    assert_eq!(begin["begin"]["version"], ours);
+    for version in ["9", "\u{1b}"] {
+        begin["begin"]["version"] = version.into();
+        write_instead(&file, &begin.to_string(), [state.clone()]);
+        let (status, said) = run(&["replay", text(&file)]);
+        assert_eq!(status, Some(0), "{said}");
+        let note = format!("; note: recorded by version {version:?}, and this is {ours:?}\n");
+        assert!(said.ends_with(&note), "{said}");
+    }
+}
+
+#[test]
 fn an_empty_record_and_one_that_was_cut_early_are_named_as_such() {
     let folder = Folder::new("record-short");
     let file = folder.join("run.mcap");

@@ -13,7 +13,7 @@ use actix::prelude::*;
 use serde::Serialize;
 
 use crate::actors::arm::sim::{
-    ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, Pose, TrackGoal, Tracking, joint_names,
+    ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal, Tracking, joint_names,
 };
 use crate::actors::node::{Ask, Asker, Barrier, Call, Done, Publish, Reply, ShutDown, Unserved};
 use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal, Goal, SentGoal};
@@ -126,15 +126,9 @@ impl<const N: usize> Ask for SendGoal<N> {
 #[rtype(result = "()")]
 pub struct GoalReport<const N: usize> {
     /// The goal.
-    pub goal_id: String,
-    /// Distance between end effector and target \[m\].
-    pub distance: f64,
-    /// The setpoint that the goal commanded \[rad\].
-    pub positions: [f64; N],
-    /// The state of the arm at that time.
-    pub pose: Pose<N>,
-    /// How it ended; `None` while it is active.
-    pub outcome: Option<Outcome>,
+    pub goal: AcceptedGoal<N>,
+    /// Its progress, or its end.
+    pub progress: GoalProgress<N>,
 }
 
 impl<const N: usize> Goal for GoalRequest<N> {
@@ -206,10 +200,8 @@ impl<const N: usize> Handler<CancelSent> for IkAction<N> {
 
     /// The client is informed if that goal is not active. Otherwise the goal's result is the answer.
     fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
-        let cancellation = self.end(
-            &GoalSelector::Sent(cancel.goal.clone()),
-            GoalStatus::Canceled,
-        );
+        let goal = GoalSelector::Sent(cancel.goal.clone());
+        let cancellation = self.end(&goal, GoalStatus::Canceled);
         ctx.wait(cancellation.map(move |outcome, _, _| {
             if let Err(why @ CancelRejected::NotSent) = outcome {
                 cancel.refuse(&why.to_string());
@@ -250,15 +242,9 @@ impl<const N: usize> Handler<GoalProgress<N>> for IkAction<N> {
         if progress.outcome.is_some() {
             self.conclude(&progress);
         } else if let Some(goal) = self.active.as_ref().filter(|goal| goal.is(&progress)) {
-            let (
-                accepted,
-                GoalProgress {
-                    distance, elapsed, ..
-                },
-            ) = (goal.goal.clone(), progress);
-            self.publish(Topic::IkFeedback, move || {
-                accepted.feedback(distance, elapsed)
-            });
+            let accepted = goal.goal.clone();
+            let feedback = move || accepted.feedback(progress.distance, progress.elapsed);
+            self.publish(Topic::IkFeedback, feedback);
             goal.inform_owner(&progress);
         }
     }
@@ -297,25 +283,19 @@ impl<const N: usize> ActiveGoal<N> {
         match &self.owner {
             None => {}
             Some(GoalOwner::Client(client)) => {
-                let GoalProgress {
-                    distance,
-                    elapsed,
-                    outcome,
-                    ..
-                } = *progress;
-                let status = match outcome {
-                    None => return client.feed_back(self.goal.feedback(distance, elapsed)),
+                let distance = progress.distance;
+                let status = match progress.outcome {
+                    None => {
+                        return client.feed_back(self.goal.feedback(distance, progress.elapsed));
+                    }
                     Some(Outcome::Reached) => GoalStatus::Succeeded,
                     Some(Outcome::Preempted) => self.if_preempted,
                 };
-                client.conclude(self.goal.result(distance, outcome), status);
+                client.conclude(self.goal.result(distance, progress.outcome), status);
             }
             Some(GoalOwner::Node(owner)) => owner.do_send(GoalReport {
-                goal_id: self.goal.id.clone(),
-                distance: progress.distance,
-                positions: self.goal.positions,
-                pose: progress.pose,
-                outcome: progress.outcome,
+                goal: self.goal.clone(),
+                progress: *progress,
             }),
         }
     }
@@ -425,14 +405,10 @@ impl<const N: usize> IkAction<N> {
         let Some(goal) = self.active.take_if(|goal| goal.is(progress)) else {
             return;
         };
-        let (
-            accepted,
-            GoalProgress {
-                distance, outcome, ..
-            },
-        ) = (goal.goal.clone(), *progress);
-        self.publish(Topic::IkResult, move || accepted.result(distance, outcome));
-        goal.inform_owner(progress);
+        let (accepted, progress) = (goal.goal.clone(), *progress);
+        let result = move || accepted.result(progress.distance, progress.outcome);
+        self.publish(Topic::IkResult, result);
+        goal.inform_owner(&progress);
     }
 
     /// The registry makes the message, if the topic has subscribers.

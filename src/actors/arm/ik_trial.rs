@@ -15,7 +15,7 @@ use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Barrier, Call, Interest, Publish, Reply, Unserved, ask};
 use crate::actors::wire::Nodes;
 use crate::math::trial::{Conclusion, Trial, TrialCommand, sample};
-use crate::protocol::catalog::{Node, Service, Topic};
+use crate::protocol::catalog::{Service, Topic};
 use crate::services::trial::status_message;
 pub use crate::services::trial::{STATUS_PERIOD, Terms, TrialRefused, TrialRequest};
 
@@ -117,16 +117,16 @@ impl<const N: usize> Handler<GoalReport<N>> for IkTrial<N> {
     type Result = ();
 
     fn handle(&mut self, news: GoalReport<N>, ctx: &mut Context<Self>) {
-        let mut commands = self.hear(&news.pose);
-        match news.outcome {
-            None => self
-                .trial
-                .feedback(&news.goal_id, news.distance, &news.positions),
+        let GoalReport { goal, progress } = news;
+        let mut commands = self.hear(&progress.pose);
+        let distance = progress.distance;
+        match progress.outcome {
+            None => self.trial.feedback(&goal.id, distance, &goal.positions),
             Some(outcome) => {
                 let conclusion = Conclusion {
-                    goal_id: news.goal_id,
+                    goal_id: goal.id,
                     outcome,
-                    final_distance: news.distance,
+                    final_distance: distance,
                 };
                 let target = || sample(&self.lengths, || self.rng.f64());
                 commands.extend(self.trial.concluded(conclusion, target));
@@ -166,7 +166,7 @@ impl<const N: usize> IkTrial<N> {
         let Some(pose) = pose else {
             // Without an arm there is nothing to do.
             if let Intent::Perform(_, mut reply) = intent {
-                reply.refuse(Unserved::NoAnswer(Node::ArmSim.name()));
+                reply.refuse(Unserved::NO_ARM);
             }
             return;
         };

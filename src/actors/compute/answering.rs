@@ -2,11 +2,10 @@
 //!
 //! **Invariant:** a call is answered once. It stops when its caller disconnects.
 
-use std::time::Instant;
+use std::time::Duration;
 
 use super::workers::{Computation, Progress, WorkerPool};
 use crate::actors::node::{Reply, Unserved};
-use crate::actors::resources::memory::NoRoom;
 use crate::actors::resources::work_clock;
 use crate::services::study::Work;
 
@@ -17,7 +16,7 @@ pub(super) fn answer<T: Send + 'static>(
     work: impl Work<T> + 'static,
 ) {
     let answering = Answering {
-        reply: Some(reply),
+        reply,
         has_room: false,
         work,
     };
@@ -25,47 +24,36 @@ pub(super) fn answer<T: Send + 'static>(
 }
 
 struct Answering<T, W> {
-    /// None once it has been answered.
-    reply: Option<Reply<T>>,
+    reply: Reply<T>,
     /// Whether room for the answer has been taken.
     has_room: bool,
     work: W,
 }
 
 impl<T: Send, W: Work<T>> Computation for Answering<T, W> {
-    fn advance(&mut self, deadline: Instant) -> Progress {
-        while let Some(reply) = &mut self.reply {
-            if reply.caller_is_gone() {
-                self.end(Unserved::CallerGone);
-                break;
+    fn advance(&mut self, deadline: Duration) -> Progress {
+        loop {
+            if self.reply.caller_is_gone() {
+                self.reply.refuse(Unserved::CALLER_GONE);
+                return Progress::Finished;
             }
             if !self.has_room {
-                if let Err(NoRoom) = reply.reserve(self.work.most_bytes()) {
+                self.has_room = self.reply.reserve(self.work.most_bytes());
+                if !self.has_room {
                     return Progress::Waiting;
                 }
-                self.has_room = true;
-            } else if let Some(answer) = self.work.advance(work_clock::reading) {
+            } else if let Some(answer) = self.work.advance(work_clock::now) {
                 // Megabytes take a worker some tenths of a second, in which it does nothing else.
-                reply.answer(answer);
-                self.reply = None;
-                break;
+                self.reply.answer(answer);
+                return Progress::Finished;
             }
             if work_clock::now() >= deadline {
                 return Progress::Unfinished;
             }
         }
-        Progress::Finished
     }
 
     fn refuse(&mut self, why: &'static str) {
-        self.end(Unserved::Refused(why));
-    }
-}
-
-impl<T, W> Answering<T, W> {
-    fn end(&mut self, why: Unserved) {
-        if let Some(mut reply) = self.reply.take() {
-            reply.refuse(why);
-        }
+        self.reply.refuse(Unserved(why));
     }
 }

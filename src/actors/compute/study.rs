@@ -16,7 +16,7 @@ use super::workers::WorkerPool;
 use crate::actors::arm::sim::{ArmSettings, HeldLimit};
 use crate::actors::node::{Call, Reply, Unserved};
 use crate::actors::wire::Nodes;
-use crate::protocol::catalog::{Node, Service};
+use crate::protocol::catalog::Service;
 use crate::services::study::{Computed, Integrating, Work};
 pub use crate::services::study::{
     IntegrationStep, PlanRun, PlannedRun, PredictStability, Predicted, Ran, Refused, RunOffline,
@@ -67,7 +67,7 @@ impl<const N: usize, A: Computed<N>> Handler<Call<A>> for Study<N> {
         let present = self.arm.send(ArmSettings).into_actor(self);
         ctx.spawn(present.map(move |present, study, _| match present {
             Ok(present) => answer(&study.workers, reply, ask.work(present)),
-            Err(_) => reply.refuse(Unserved::NoAnswer(Node::ArmSim.name())),
+            Err(_) => reply.refuse(Unserved::NO_ARM),
         }));
     }
 }

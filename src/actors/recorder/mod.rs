@@ -16,9 +16,7 @@ use tokio::sync::oneshot;
 
 use self::clock::TapeClock;
 use self::limits::MAX_RECORD_BYTES;
-pub use self::requests::{
-    EndRecord, NotRecorded, RecordTo, Recorded, StartRecording, StopRecording,
-};
+pub use self::requests::{NotRecorded, RecordTo, Recorded, StartRecording, StopRecording};
 use self::tape::{Begun, TapeTarget};
 use crate::actors::arm::sim::SetListener;
 use crate::actors::gateway::registry::SetTap;
@@ -126,15 +124,10 @@ impl<const N: usize> Handler<RecordTo> for Recorder<N> {
 
     fn handle(&mut self, RecordTo(path): RecordTo, ctx: &mut Context<Self>) -> Self::Result {
         let limit = None;
-        Box::pin(self.begin(TapeTarget { path, limit }, ctx))
-    }
-}
-
-impl<const N: usize> Handler<EndRecord> for Recorder<N> {
-    type Result = ResponseActFuture<Self, ()>;
-
-    fn handle(&mut self, _: EndRecord, _: &mut Context<Self>) -> Self::Result {
-        Box::pin(self.end().map(|_, _, _| ()))
+        match path {
+            Some(path) => Box::pin(self.begin(TapeTarget { path, limit }, ctx)),
+            None => Box::pin(self.end().map(|_, _, _| Ok(()))),
+        }
     }
 }
 
@@ -142,11 +135,8 @@ impl<const N: usize> Handler<RecordEnded> for Recorder<N> {
     type Result = ();
 
     fn handle(&mut self, RecordEnded(number): RecordEnded, ctx: &mut Context<Self>) {
-        if self
-            .current
-            .as_ref()
-            .is_some_and(|one| one.number == number)
-        {
+        let current = self.current.as_ref();
+        if current.is_some_and(|one| one.number == number) {
             ctx.wait(self.end().map(|_, _, _| ()));
         }
     }

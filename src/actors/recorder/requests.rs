@@ -49,15 +49,11 @@ pub struct Recorded {
     pub dropped: u64,
 }
 
-/// Starts a record in this file. From the runtime, when it starts.
+/// Starts a record in this file, or ends the record if there is no file. From the runtime, when it starts and when it
+/// ends.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 #[rtype(result = "Result<(), NotRecorded>")]
-pub struct RecordTo(pub PathBuf);
-
-/// Ends the record, if there is one. From the runtime, when it ends.
-#[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "()")]
-pub struct EndRecord;
+pub struct RecordTo(pub Option<PathBuf>);
 
 /// Why a record was not started or not ended.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -1,18 +1,18 @@
 //! The path of entries to the file: a bounded queue, and the thread that writes.
 //!
 //! **Invariant:** no sender waits for the file. A message that does not fit into the queue is dropped, counted
-//! and reported. Inputs are dropped last.
+//! and reported. Topics leave half of the queue to inputs.
 
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Instant;
 
-use tokio::sync::oneshot;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
 use super::clock::TapeClock;
 use super::limits::{FLUSH_PERIOD, MAX_RECORDS, MAX_WAITING_BYTES, MAX_WAITING_ENTRIES};
@@ -32,15 +32,19 @@ pub(super) struct TapeTarget {
 /// The queue of a record. The thread ends when the last clone is dropped.
 #[derive(Clone)]
 pub(super) struct Tape {
-    entries: SyncSender<RecordEntry>,
+    entries: Sender<Waiting>,
+    /// The free bytes of the queue for inputs, and for all other entries.
+    for_inputs: Arc<Semaphore>,
+    for_topics: Arc<Semaphore>,
     counts: Arc<TapeCounts>,
     clock: TapeClock,
 }
 
+/// An entry in the queue, with its bytes.
+type Waiting = (RecordEntry, OwnedSemaphorePermit);
+
 #[derive(Default)]
 struct TapeCounts {
-    entries: AtomicUsize,
-    bytes: AtomicUsize,
     dropped: AtomicU64,
     is_over: AtomicBool,
 }
@@ -72,13 +76,8 @@ pub(super) fn begin(
                 Ok(writer) => writer,
                 Err(why) => return drop(answer.send(Err(why))),
             };
-            let (entries, queue) = sync_channel(MAX_WAITING_ENTRIES);
-            let counts = Arc::<TapeCounts>::default();
-            let tape = Tape {
-                entries,
-                counts: Arc::clone(&counts),
-                clock: TapeClock::start(),
-            };
+            let (tape, queue) = Tape::new();
+            let counts = Arc::clone(&tape.counts);
             let (ended, end) = oneshot::channel();
             if answer.send(Ok(Begun { tape, end })).is_err() {
                 return;
@@ -127,32 +126,45 @@ fn failure(target: &TapeTarget, why: &impl ToString) -> NotRecorded {
 }
 
 impl Tape {
+    /// An empty queue, and its end.
+    fn new() -> (Self, Receiver<Waiting>) {
+        let (entries, queue) = channel();
+        let half = || Arc::new(Semaphore::new(MAX_WAITING_BYTES / 2));
+        let tape = Self {
+            entries,
+            for_inputs: half(),
+            for_topics: half(),
+            counts: Arc::default(),
+            clock: TapeClock::start(),
+        };
+        (tape, queue)
+    }
+
     /// Records an entry, unless the queue is full. Returns whether it did.
     pub(super) fn put(&self, content: Content) -> bool {
         if self.counts.is_over.load(Ordering::Relaxed) {
             return false;
         }
-        let bytes = content.allocated();
         // Inputs are few and short, and a replay needs every one.
-        let share = if matches!(content, Content::Input { .. }) {
-            1
-        } else {
-            2
+        let room = match content {
+            Content::Input { .. } => &self.for_inputs,
+            _ => &self.for_topics,
         };
-        let entries_before = self.counts.entries.fetch_add(1, Ordering::Relaxed);
-        let bytes_before = self.counts.bytes.fetch_add(bytes, Ordering::Relaxed);
-        let fits = entries_before < MAX_WAITING_ENTRIES / share
-            && bytes_before.saturating_add(bytes) <= MAX_WAITING_BYTES / share;
+        // A short entry counts as more bytes, which bounds the number of entries too.
+        let bytes = content
+            .allocated()
+            .max(MAX_WAITING_BYTES / MAX_WAITING_ENTRIES);
+        let bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
+        let place = Arc::clone(room).try_acquire_many_owned(bytes);
         let entry = RecordEntry {
             log_time: self.clock.now(),
             content,
         };
-        if fits && self.entries.try_send(entry).is_ok() {
-            return true;
+        let is_put = place.is_ok_and(|place| self.entries.send((entry, place)).is_ok());
+        if !is_put {
+            self.counts.dropped.fetch_add(1, Ordering::Relaxed);
         }
-        self.counts.written(bytes);
-        self.counts.dropped.fetch_add(1, Ordering::Relaxed);
-        false
+        is_put
     }
 
     /// The same. `None` means that an entry was too long and is dropped.
@@ -164,18 +176,10 @@ impl Tape {
     }
 }
 
-impl TapeCounts {
-    /// An entry has left the queue.
-    fn written(&self, bytes: usize) {
-        self.entries.fetch_sub(1, Ordering::Relaxed);
-        self.bytes.fetch_sub(bytes, Ordering::Relaxed);
-    }
-}
-
 /// Writes entries until the last tape is dropped, the file fails, or the size limit is reached.
 fn write(
     mut writer: McapWriter<io::BufWriter<File>>,
-    queue: &Receiver<RecordEntry>,
+    queue: &Receiver<Waiting>,
     counts: &TapeCounts,
     target: &TapeTarget,
     over: impl FnOnce(),
@@ -211,7 +215,7 @@ fn write(
 /// Writes waiting entries. Returns `false` if the file has become too long.
 fn take_entries(
     writer: &mut McapWriter<io::BufWriter<File>>,
-    queue: &Receiver<RecordEntry>,
+    queue: &Receiver<Waiting>,
     counts: &TapeCounts,
     target: &TapeTarget,
 ) -> Result<bool, RecordError> {
@@ -220,8 +224,7 @@ fn take_entries(
     loop {
         let is_last = match queue.recv_timeout(flush_due.saturating_duration_since(Instant::now()))
         {
-            Ok(entry) => {
-                counts.written(entry.content.allocated());
+            Ok((entry, _)) => {
                 match writer.write(&entry) {
                     // A frame that cannot be read back is a fault of the runtime, but does not end the record.
                     Err(error @ RecordError::Frame(_)) => {
@@ -262,17 +265,6 @@ mod tests {
     use super::*;
     use crate::protocol::catalog::Topic;
 
-    /// A tape with a queue that is never emptied.
-    fn stuck() -> (Tape, Receiver<RecordEntry>) {
-        let (entries, queue) = sync_channel(MAX_WAITING_ENTRIES);
-        let tape = Tape {
-            entries,
-            counts: Arc::default(),
-            clock: TapeClock::start(),
-        };
-        (tape, queue)
-    }
-
     fn message(bytes: usize) -> Content {
         Content::NodeMessage {
             topic: Topic::JointTrajectory,
@@ -293,7 +285,7 @@ mod tests {
 
     #[test]
     fn topics_leave_half_of_the_queue_to_inputs() {
-        let (tape, queue) = stuck();
+        let (tape, queue) = Tape::new();
         for _ in 0..MAX_WAITING_ENTRIES / 2 {
             assert!(tape.put(message(1)));
         }
@@ -303,14 +295,13 @@ mod tests {
         }
         assert!(!tape.put(input()));
         assert_eq!(dropped(&tape), 2);
-        let taken = queue.recv().unwrap();
-        tape.counts.written(taken.content.allocated());
-        assert!(tape.put(input()));
+        drop(queue.recv().unwrap());
+        assert!(tape.put(message(1)));
     }
 
     #[test]
     fn the_bytes_that_wait_are_bounded() {
-        let (tape, _queue) = stuck();
+        let (tape, _queue) = Tape::new();
         let long = 1024 * 1024;
         let taken = (0..).take_while(|_| tape.put(message(long))).count();
         assert_eq!(

@@ -58,17 +58,13 @@ impl Memory {
     }
 
     /// The permit for an answer of at most `bytes` bytes, if there is enough memory now. The longest answer fits
-    /// once all others have been released.
-    ///
-    /// # Errors
-    /// [`NoRoom`] while other answers use it.
-    pub fn answer(&self, bytes: usize) -> Result<Permit, NoRoom> {
+    /// once all others have been written.
+    #[must_use]
+    pub fn answer(&self, bytes: usize) -> Option<Permit> {
         let parts = bytes.div_ceil(ANSWER_PART).min(self.size.1);
         let parts = u32::try_from(parts).unwrap_or(u32::MAX);
         let permit = Arc::clone(&self.answers).try_acquire_many_owned(parts);
-        permit
-            .map(|permit| Permit::new(Some(permit)))
-            .map_err(|_| NoRoom)
+        Some(Permit::new(Some(permit.ok()?)))
     }
 
     /// The number of taken permits of both pools.
@@ -79,10 +75,6 @@ impl Memory {
             - self.answers.available_permits()
     }
 }
-
-/// Other answers use the memory for long answers. It is released when they have been written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NoRoom;
 
 /// The permit for a long frame or a long answer, until its last clone is dropped.
 #[derive(Debug, Clone)]
@@ -138,9 +130,9 @@ mod tests {
     fn an_answer_longer_than_the_pool_has_it_alone() {
         let memory = Memory::of(1, MIB);
         let longest = memory.answer(usize::MAX).unwrap();
-        assert_eq!(memory.answer(1).unwrap_err(), NoRoom);
+        assert!(memory.answer(1).is_none());
         drop(longest);
-        assert!(memory.answer(1).is_ok());
+        assert!(memory.answer(1).is_some());
     }
 
     #[test]

@@ -81,10 +81,7 @@ impl Handler<Call<Look>> for RosapiNode {
     type Result = ();
 
     fn handle(&mut self, call: Call<Look>, ctx: &mut Context<Self>) {
-        let Call {
-            ask: look,
-            mut reply,
-        } = call;
+        let Call { ask, mut reply } = call;
         let registry = self.registry.clone();
         let answered = async move {
             // Only calls with a permit hold a census, however many calls wait.
@@ -92,10 +89,10 @@ impl Handler<Call<Look>> for RosapiNode {
                 return;
             };
             let census = registry.send(TakeCensus).await.unwrap_or_default();
-            while reply.reserve(census.most_bytes()).is_err() {
+            while !reply.reserve(census.most_bytes()) {
                 sleep(ROOM_RETRY).await;
             }
-            let list = move || reply.answer(Listing { look, census });
+            let list = move || reply.answer(Listing { look: ask, census });
             place.perform(list).await;
         };
         ctx.spawn(answered.into_actor(self));

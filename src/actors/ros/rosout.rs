@@ -81,11 +81,8 @@ impl Handler<Interest> for Rosout {
 
 fn message((metadata, msg): Warning, time: f64) -> Publish {
     // The levels are those of ROS.
-    let level = if *metadata.level() == Level::ERROR {
-        40
-    } else {
-        30
-    };
+    let is_error = *metadata.level() == Level::ERROR;
+    let level = if is_error { 40 } else { 30 };
     Publish::made(Topic::Rosout, move || LogMessage {
         stamp: Stamp::from_seconds(time),
         level,

@@ -27,7 +27,7 @@ use crate::actors::node::{
     Asker, Call, Done, FrameKind, Interest, Reply, Respond, Unserved, guard,
 };
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
-use crate::actors::resources::memory::{Memory, NoRoom, Permit, SHORT, cover};
+use crate::actors::resources::memory::{Memory, Permit, SHORT, cover};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::messages::Level;
 use crate::protocol::op::Arguments;
@@ -63,7 +63,7 @@ impl Nodes {
         let node = node.into();
         let take = move |call: ServiceCall| {
             let node = node.clone();
-            let length = call.arguments.payload().get().len();
+            let length = call.arguments.get().len();
             let read = move || {
                 let mut caller = call.caller;
                 match A::read(call.service, &call.arguments) {
@@ -84,11 +84,22 @@ impl Nodes {
         self.services.insert(service, Box::new(take));
     }
 
-    /// Messages of clients on `topic` are read by `take`.
-    pub fn listen(&mut self, topic: Topic, take: impl Fn(TopicMessage) + Clone + Send + 'static) {
+    /// Messages of clients on `topic` are read by `read`, and are for this node as `to_node` makes them.
+    pub fn listen<T: 'static, E: Display + 'static, M: Message<Result = ()> + Send + 'static>(
+        &mut self,
+        topic: Topic,
+        node: impl Into<Recipient<M>>,
+        read: fn(&Payload) -> Result<T, E>,
+        to_node: fn(T, TopicMessage) -> M,
+    ) {
+        let node = node.into();
         let take = move |message: TopicMessage| {
-            let take = take.clone();
-            read_arguments(message.msg.get().len(), move || take(message));
+            let node = node.clone();
+            let length = message.msg.get().len();
+            read_arguments(length, move || match read(&message.msg) {
+                Ok(content) => node.do_send(to_node(content, message)),
+                Err(why) => message.refuse(topic, &why),
+            });
         };
         self.listeners.insert(topic, Box::new(take));
     }
@@ -101,7 +112,7 @@ impl Nodes {
         let take = move |request| match request {
             ActionRequest::Goal(ForwardGoal { goal, client, done }) => {
                 let node = node.clone();
-                let length = goal.payload().get().len();
+                let length = goal.get().len();
                 let read = move || match G::read(&goal) {
                     Ok(goal) => node.do_send(ForwardGoal { goal, client, done }),
                     Err(rejections) => client.refuse(&rejections.status()),
@@ -219,17 +230,18 @@ impl Caller {
     }
 
     /// Reserves memory for an answer of at most `bytes` bytes, besides the echo of the caller's `id`, before it is
-    /// computed. Short answers need no reservation.
-    ///
-    /// # Errors
-    /// While other answers use it.
-    pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
+    /// computed. `false` while other answers use it. Short answers need no reservation.
+    pub fn reserve(&mut self, bytes: usize) -> bool {
         let id = self.id().map_or(0, |id| id.get().len());
         let bytes = bytes.saturating_add(id);
-        if bytes > SHORT {
-            self.permit = Some(self.memory.answer(bytes)?);
+        if bytes <= SHORT {
+            return true;
         }
-        Ok(())
+        let Some(permit) = self.memory.answer(bytes) else {
+            return false;
+        };
+        self.permit = Some(permit);
+        true
     }
 
     /// Tells the caller by a status, before the answer, why what it asked for has no effect yet.
@@ -263,7 +275,7 @@ impl Caller {
 
 impl Drop for Caller {
     fn drop(&mut self) {
-        self.refuse(&Unserved::Ended.to_string());
+        self.refuse(&Unserved::ENDED.to_string());
     }
 }
 
@@ -293,7 +305,7 @@ impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
         self.caller.warn(why);
     }
 
-    fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
+    fn reserve(&mut self, bytes: usize) -> bool {
         self.caller.reserve(bytes)
     }
 }

@@ -90,24 +90,17 @@ pub struct Type {
     pub constants: &'static [Constant],
 }
 
-/// A named value of a type.
+/// A named value of a type, a `byte`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Constant {
     /// `WARN`.
     pub name: &'static str,
-    /// `byte`.
-    pub kind: &'static str,
     /// `30`.
     pub value: &'static str,
 }
 
-/// A constant of type `byte`.
 pub(super) const fn byte(name: &'static str, value: &'static str) -> Constant {
-    Constant {
-        name,
-        kind: "byte",
-        value,
-    }
+    Constant { name, value }
 }
 
 /// A message type without constants.

@@ -180,13 +180,3 @@ const HEALTH: &[Constant] = &[
     byte("ERROR", "2"),
     byte("STALE", "3"),
 ];
-
-impl Field {
-    /// The members of an object field of a request or a response, in documented order; empty for every other field.
-    #[must_use]
-    pub fn members(&self) -> &'static [Self] {
-        let mut types = TYPES.iter();
-        let kind = types.find(|one| one.name == self.kind);
-        kind.map_or(&[], |one| one.fields)
-    }
-}

@@ -135,7 +135,7 @@ const LOG_LEVELS: &[Constant] = &[
 ];
 
 /// A goal's name in ROS 1.
-const GOAL_ID: &[Field] = fields!["builtin_interfaces/msg/Time stamp  # s, ns", "string id",];
+const GOAL_ID: &[Field] = fields!["builtin_interfaces/msg/Time stamp  # s, ns", "string id?",];
 
 /// The names of topics, in both spellings.
 macro_rules! spellings {

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use std::sync::LazyLock;
 
 use super::Action;
+use super::entry::Field;
 pub use super::entry::{Constant, Count, Type};
 use super::parts;
 use super::topics::Topic;
@@ -42,6 +43,15 @@ pub fn find(name: &str) -> Option<Type> {
     found
         .copied()
         .filter(|one| names::same_type(one.name, name))
+}
+
+impl Field {
+    /// The members of an object field of a request, a message or a response, in documented order; empty for every other
+    /// field.
+    #[must_use]
+    pub fn members(&self) -> &'static [Self] {
+        find(self.kind).map_or(&[], |one| one.fields)
+    }
 }
 
 /// `first` and every type inside it, each once, in the order of first use.
@@ -86,10 +96,8 @@ pub fn definition(first: Type) -> String {
 }
 
 fn own_text(one: Type) -> String {
-    let constants = one
-        .constants
-        .iter()
-        .map(|one| format!("{} {}={}\n", one.kind, one.name, one.value));
+    let constants = one.constants.iter();
+    let constants = constants.map(|one| format!("byte {}={}\n", one.name, one.value));
     let fields = one.fields.iter().map(|field| {
         let kind = names::short_type(field.kind);
         match field.unit {

@@ -1,13 +1,13 @@
 //! Messages of the nodes `ik`, `ik_action` and `ik_trial`: solutions, feedback, results, the status of a trial, and the
 //! trajectory that carries a goal's setpoint.
 //!
-//! **Invariant:** the fields are the catalog's, in its order. A missing value is `null`, except `phi` of a target,
+//! **Invariant:** the fields are the catalog's. A missing value is `null`, except `phi` of a target,
 //! which is omitted.
 
 use serde::Serialize;
-use serde_json::value::{RawValue, to_raw_value};
+use serde_json::{Value, json};
 
-use crate::protocol::messages::{Header, JointTrajectory, JointTrajectoryPoint, Stamp};
+use crate::protocol::messages::Stamp;
 
 /// A target position of the end effector.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -70,25 +70,18 @@ pub struct TrialStatus {
     pub action_status: &'static str,
 }
 
-/// A trajectory of one point: `positions` \[rad\], at rest, as soon as possible.
+/// A `trajectory_msgs/msg/JointTrajectory` of one point: `positions` \[rad\], at rest, as soon as possible.
 #[must_use]
-pub fn setpoint_trajectory(joint_names: &[&str], positions: &[f64]) -> Box<RawValue> {
-    let velocities = vec![0.0; positions.len()];
-    let trajectory = JointTrajectory {
-        header: Header {
-            stamp: Stamp::default(),
-            frame_id: "",
-        },
-        joint_names,
-        points: &[JointTrajectoryPoint {
-            positions,
-            velocities: &velocities,
-            accelerations: &[],
-            time_from_start: Stamp::default(),
+pub fn setpoint_trajectory(joint_names: &[&str], positions: &[f64]) -> Value {
+    let now = Stamp::default();
+    json!({
+        "header": {"stamp": now, "frame_id": ""},
+        "joint_names": joint_names,
+        "points": [{
+            "positions": positions,
+            "velocities": vec![0.0; positions.len()],
+            "accelerations": [],
+            "time_from_start": now,
         }],
-    };
-    to_raw_value(&trajectory).unwrap_or_else(|_| {
-        debug_assert!(false, "numbers and names can always be written as JSON");
-        RawValue::NULL.to_owned()
     })
 }

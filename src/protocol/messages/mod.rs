@@ -13,8 +13,8 @@ use bytes::Bytes;
 use serde::Serialize;
 
 pub use self::telemetry::{
-    Clock, DiagnosticArray, DiagnosticStatus, ErrorEstimateMessage, Header, JointState,
-    JointTrajectory, JointTrajectoryPoint, KeyValue, Stamp,
+    Clock, DiagnosticArray, DiagnosticStatus, ErrorEstimateMessage, Header, JointState, KeyValue,
+    Stamp,
 };
 use crate::protocol::catalog::table;
 use crate::protocol::wire::json::Payload;
@@ -67,7 +67,7 @@ impl ErrorForm {
 #[must_use]
 pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
     Encoder::op("publish")
-        .text("topic", topic)
+        .value("topic", topic)
         .value("msg", msg)
         .end()
 }
@@ -79,7 +79,7 @@ pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
     // text.
     let head = "{\"op\":\"publish\",\"topic\":\"\",\"msg\":}\n".len();
     Encoder::with_room("publish", head + topic.len() + msg.line().len())
-        .text("topic", topic)
+        .value("topic", topic)
         .value("msg", msg)
         .end()
 }
@@ -93,7 +93,7 @@ pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
     }
     let mut text = Vec::with_capacity(frames.len());
     for frame in series::messages(frames.clone()) {
-        let mut line = Encoder::after(text, "publish").text("topic", spelling);
+        let mut line = Encoder::after(text, "publish").value("topic", spelling);
         line.key("msg");
         line.text.extend_from_slice(message_text(topic, &frame));
         line.text.extend_from_slice(b"}\n");
@@ -124,11 +124,11 @@ pub fn response(
     status: &str,
 ) -> Bytes {
     Encoder::op("service_response")
-        .text("service", service)
+        .value("service", service)
         .optional("id", id)
         .value("values", values)
         .value("result", &result)
-        .text("status", status)
+        .value("status", status)
         .end()
 }
 
@@ -145,7 +145,7 @@ pub fn failure(service: &str, id: Option<&Payload>, status: &str, form: ErrorFor
 #[must_use]
 pub fn action_feedback(action: &str, id: Option<&Payload>, values: &impl Serialize) -> Bytes {
     Encoder::op("action_feedback")
-        .text("action", action)
+        .value("action", action)
         .optional("id", id)
         .value("values", values)
         .end()
@@ -162,7 +162,7 @@ pub fn action_result(
     result: bool,
 ) -> Bytes {
     Encoder::op("action_result")
-        .text("action", action)
+        .value("action", action)
         .optional("id", id)
         .value("values", values)
         .value("status", &status)
@@ -180,8 +180,8 @@ pub fn action_goal(
     feedback: bool,
 ) -> Bytes {
     Encoder::with_room("send_action_goal", args.line().len() + USUAL_FRAME)
-        .text("action", action)
-        .text("id", id)
+        .value("action", action)
+        .value("id", id)
         .optional("action_type", type_name)
         .value("args", args)
         .value("feedback", &feedback)
@@ -192,8 +192,8 @@ pub fn action_goal(
 #[must_use]
 pub fn cancellation(action: &str, id: &str) -> Bytes {
     Encoder::op("cancel_action_goal")
-        .text("action", action)
-        .text("id", id)
+        .value("action", action)
+        .value("id", id)
         .end()
 }
 
@@ -201,8 +201,8 @@ pub fn cancellation(action: &str, id: &str) -> Bytes {
 #[must_use]
 pub fn status(level: Level, msg: &str, id: Option<&Payload>) -> Bytes {
     Encoder::op("status")
-        .text("level", level.name())
-        .text("msg", msg)
+        .value("level", level.name())
+        .value("msg", msg)
         .optional("id", id)
         .end()
 }
@@ -211,8 +211,8 @@ pub fn status(level: Level, msg: &str, id: Option<&Payload>) -> Bytes {
 #[must_use]
 pub fn call(service: &str, id: &str, args: &Payload) -> Bytes {
     Encoder::with_room("call_service", args.line().len() + USUAL_FRAME)
-        .text("service", service)
-        .text("id", id)
+        .value("service", service)
+        .value("id", id)
         .value("args", args)
         .end()
 }
@@ -247,10 +247,6 @@ impl Encoder {
         self.text.extend_from_slice(b",\"");
         self.text.extend_from_slice(key.as_bytes());
         self.text.extend_from_slice(b"\":");
-    }
-
-    fn text(self, key: &str, text: &str) -> Self {
-        self.value(key, text)
     }
 
     fn value<T: Serialize + ?Sized>(mut self, key: &str, value: &T) -> Self {

@@ -6,8 +6,8 @@
 
 use serde::Serialize;
 
-use crate::protocol::messages::Stamp;
 pub use crate::protocol::messages::telemetry::WORLD;
+use crate::protocol::messages::{Header, Stamp};
 
 /// The frame of the end effector, at the end of the last link.
 pub const END_EFFECTOR: &str = "hand";
@@ -36,20 +36,11 @@ pub struct TfMessage {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TransformStamped {
     /// Time, and the parent's frame.
-    pub header: OwnedHeader,
+    pub header: Header<String>,
     /// The frame.
     pub child_frame_id: String,
     /// Its pose.
     pub transform: Transform,
-}
-
-/// `std_msgs/msg/Header` with its own frame name.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct OwnedHeader {
-    /// Simulation time.
-    pub stamp: Stamp,
-    /// The parent's frame.
-    pub frame_id: String,
 }
 
 /// `geometry_msgs/msg/Transform`.
@@ -131,7 +122,7 @@ impl FramePose {
     fn of(self, stamp: Stamp, parent: &str, child: &str) -> TransformStamped {
         let (sin, cos) = (self.angle / 2.0).sin_cos();
         TransformStamped {
-            header: OwnedHeader {
+            header: Header {
                 stamp,
                 frame_id: parent.to_owned(),
             },

@@ -50,14 +50,14 @@ impl Stamp {
 
 /// `std_msgs/msg/Header`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Header<'a> {
+pub struct Header<S = &'static str> {
     /// Simulation time.
     pub stamp: Stamp,
-    /// [`WORLD`] in all messages of the arm.
-    pub frame_id: &'a str,
+    /// [`WORLD`] in all messages of the arm; the parent's frame in a transform.
+    pub frame_id: S,
 }
 
-impl Header<'static> {
+impl Header {
     /// A header in the world frame, at simulation time `time` \[s\].
     #[must_use]
     pub fn world(time: f64) -> Self {
@@ -72,7 +72,7 @@ impl Header<'static> {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct JointState<'a> {
     /// Time and frame.
-    pub header: Header<'a>,
+    pub header: Header,
     /// Joint names.
     pub name: &'a [&'a str],
     /// Positions \[rad\].
@@ -81,30 +81,6 @@ pub struct JointState<'a> {
     pub velocity: &'a [f64],
     /// Efforts \[N m\].
     pub effort: &'a [f64],
-}
-
-/// `trajectory_msgs/msg/JointTrajectory`, as sent.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct JointTrajectory<'a> {
-    /// Time and frame.
-    pub header: Header<'a>,
-    /// Joint names.
-    pub joint_names: &'a [&'a str],
-    /// The points. The last one is held.
-    pub points: &'a [JointTrajectoryPoint<'a>],
-}
-
-/// `trajectory_msgs/msg/JointTrajectoryPoint`, as sent.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct JointTrajectoryPoint<'a> {
-    /// Positions \[rad\].
-    pub positions: &'a [f64],
-    /// Velocities \[rad/s\].
-    pub velocities: &'a [f64],
-    /// Accelerations \[rad/s²\]; empty: not prescribed.
-    pub accelerations: &'a [f64],
-    /// Time of the point; 0 means at once.
-    pub time_from_start: Stamp,
 }
 
 /// `rosgraph_msgs/msg/Clock`.
@@ -118,7 +94,7 @@ pub struct Clock {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct DiagnosticArray<'a> {
     /// Time and frame.
-    pub header: Header<'a>,
+    pub header: Header,
     /// One status per part of the runtime.
     pub status: Vec<DiagnosticStatus<'a>>,
 }

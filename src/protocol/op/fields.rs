@@ -11,12 +11,12 @@ use std::fmt;
 
 use serde_json::value::RawValue;
 
-pub use super::rejections::{Bound, Reason, RejectedField, Rejections};
+pub use super::rejections::{Bound, RejectedField, Rejections};
+pub(crate) use super::rejections::{MISSING, finite, mistyped, too_many, wrong_length};
 
 use crate::protocol::catalog::{Action, Field, Service, Topic};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::json;
-use crate::protocol::wire::text;
 
 /// The fields of one request.
 #[derive(Debug)]
@@ -60,37 +60,25 @@ impl<'a> Fields<'a> {
     fn filled(self, args: &'a Arguments) -> Result<Self, RejectedField> {
         let mut read = self;
         let (fields, values) = (read.fields, &mut read.values);
-        let refused = |reason| RejectedField {
-            field: "args".to_owned(),
-            reason,
-        };
-        let not = |expected, raw: &RawValue| {
-            refused(Reason::Mistyped {
-                expected: Cow::Borrowed(expected),
-                found: text::found(raw),
-            })
-        };
-        match args {
-            Arguments::Neither(args) => {
-                return Err(not("an object or an array", args.raw()));
-            }
-            Arguments::Object(args) => {
-                let raw = args.raw();
+        let refused = |reason: String| RejectedField::refused("args", &reason);
+        let raw = args.raw();
+        match raw.get().as_bytes().first() {
+            Some(b'{') => {
                 let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
-                json::members_into(raw.get(), &names, values).map_err(|_| not("an object", raw))?;
+                json::members_into(raw.get(), &names, values)
+                    .map_err(|_| refused(mistyped("an object", raw)))?;
             }
-            Arguments::Positional(args) => {
-                let raw = args.raw();
-                let entries =
-                    json::entries(raw, fields.len()).ok_or_else(|| not("an array", raw))?;
+            Some(b'[') => {
+                let entries = json::entries(raw, fields.len())
+                    .ok_or_else(|| refused(mistyped("an array", raw)))?;
                 if entries.count > fields.len() {
-                    let (limit, got) = (fields.len(), entries.count);
-                    return Err(refused(Reason::TooMany { limit, got }));
+                    return Err(refused(too_many(fields.len(), entries.count)));
                 }
                 for (value, entry) in values.iter_mut().zip(entries.first) {
                     *value = Some(entry);
                 }
             }
+            _ => return Err(refused(mistyped("an object or an array", raw))),
         }
         Ok(read)
     }
@@ -136,7 +124,7 @@ impl<'a> Fields<'a> {
         let raw = self.take(name)?;
         match finite(raw, bound) {
             Ok(value) => Some(value),
-            Err(reason) => self.rejected_as(name, reason),
+            Err(reason) => self.rejected_as(name, &reason),
         }
     }
 
@@ -144,24 +132,17 @@ impl<'a> Fields<'a> {
     pub fn numbers(&mut self, name: &'static str, count: usize, bound: Bound) -> Option<Vec<f64>> {
         let raw = self.take(name)?;
         let Some(entries) = json::entries(raw, count) else {
-            let expected = format!("an array of {count} numbers");
-            return self.mistyped(name, expected, raw);
+            return self.mistyped(name, &format!("an array of {count} numbers"), raw);
         };
         if entries.count != count {
-            return self.rejected_as(
-                name,
-                Reason::Length {
-                    expected: count,
-                    got: entries.count,
-                },
-            );
+            return self.rejected_as(name, &wrong_length(count, entries.count));
         }
         let mut values = Vec::with_capacity(count);
         for (index, entry) in entries.first.into_iter().enumerate() {
             match finite(entry, bound) {
                 Ok(value) => values.push(value),
                 Err(reason) => {
-                    self.rejected_as::<()>(&format!("{name}[{index}]"), reason);
+                    self.rejected_as::<()>(&format!("{name}[{index}]"), &reason);
                 }
             }
         }
@@ -175,20 +156,12 @@ impl<'a> Fields<'a> {
 
     /// `true` or `false`.
     pub fn boolean(&mut self, name: &'static str) -> Option<bool> {
-        let raw = self.take(name)?;
-        match json::boolean(raw) {
-            Some(value) => Some(value),
-            None => self.mistyped(name, "true or false", raw),
-        }
+        self.value(name, "true or false", json::boolean)
     }
 
     /// A string.
     pub fn text(&mut self, name: &'static str) -> Option<Cow<'a, str>> {
-        let raw = self.take(name)?;
-        match json::text(raw) {
-            Some(text) => Some(text),
-            None => self.mistyped(name, "a string", raw),
-        }
+        self.value(name, "a string", json::text)
     }
 
     /// The raw value.
@@ -203,8 +176,7 @@ impl<'a> Fields<'a> {
             return self.mistyped(name, "an array", raw);
         };
         if entries.count > most {
-            let (limit, got) = (most, entries.count);
-            return self.rejected_as(name, Reason::TooMany { limit, got });
+            return self.rejected_as(name, &too_many(most, entries.count));
         }
         Some(entries.first)
     }
@@ -226,13 +198,10 @@ impl<'a> Fields<'a> {
     pub fn count(&mut self, name: &'static str, limit: u64) -> Option<u64> {
         let raw = self.take(name)?;
         match json::integer(raw) {
-            Some(value) if value > limit => {
-                let found = text::excerpt(raw.get());
-                self.rejected_as(name, Reason::TooLarge { limit, found })
-            }
+            Some(value) if value > limit => self.mistyped(name, &format!("at most {limit}"), raw),
             Some(value) if value > 0 => Some(value),
             _ if json::number(raw).is_some_and(f64::is_infinite) => {
-                self.rejected_as(name, Reason::NotFinite)
+                self.rejected_as(name, "must be a finite number")
             }
             _ => self.mistyped(name, "an integer, at least 1", raw),
         }
@@ -240,8 +209,7 @@ impl<'a> Fields<'a> {
 
     /// A whole number, 0 or more; `10.0` counts as 10.
     pub fn whole(&mut self, name: &'static str) -> Option<u64> {
-        let raw = self.take(name)?;
-        json::integer(raw).or_else(|| self.mistyped(name, "an integer, at least 0", raw))
+        self.value(name, "an integer, at least 0", json::integer)
     }
 
     /// One of `options`, by its name.
@@ -251,17 +219,23 @@ impl<'a> Fields<'a> {
         options: &[T],
         name_of: impl Fn(T) -> &'static str,
     ) -> Option<T> {
-        let raw = self.take(name)?;
-        let text = json::text(raw);
-        let chosen = options
-            .iter()
-            .copied()
-            .find(|&option| Some(name_of(option)) == text.as_deref());
-        if chosen.is_some() {
-            return chosen;
-        }
         let names: Vec<&str> = options.iter().map(|&option| name_of(option)).collect();
-        self.mistyped(name, format!("one of {}", names.join(", ")), raw)
+        self.value(name, &format!("one of {}", names.join(", ")), |raw| {
+            let text = json::text(raw)?;
+            let index = names.iter().position(|name| *name == text)?;
+            options.get(index).copied()
+        })
+    }
+
+    /// A value that `read` accepts.
+    fn value<T>(
+        &mut self,
+        name: &'static str,
+        expected: &str,
+        read: impl FnOnce(&'a RawValue) -> Option<T>,
+    ) -> Option<T> {
+        let raw = self.take(name)?;
+        read(raw).or_else(|| self.mistyped(name, expected, raw))
     }
 
     /// An object. `read` reads its members like the fields of a request. `None` if it is absent or not an object. The
@@ -291,16 +265,10 @@ impl<'a> Fields<'a> {
         Some(value)
     }
 
-    /// Rejects a field for a reason from another layer. The reason continues the sentence after the field's name.
+    /// Rejects a field. The reason continues the sentence after the field's name.
     pub fn refuse(&mut self, name: &str, reason: &impl fmt::Display) {
         self.rejections
             .refuse(&format!("{}{name}", self.prefix), reason);
-    }
-
-    /// Returns the rejections so far, in the order of reading.
-    #[must_use]
-    pub fn rejections(&self) -> &[RejectedField] {
-        self.rejections.as_slice()
     }
 
     /// Returns the rejections after the whole request has been read.
@@ -326,12 +294,6 @@ impl<'a> Fields<'a> {
         self.rejections.is_empty()
     }
 
-    /// All rejections in one line; empty if there are none: the `status` of the response.
-    #[must_use]
-    pub fn status(&self) -> String {
-        self.rejections.status()
-    }
-
     /// Takes the value of that name. A missing required field is rejected.
     fn take(&mut self, name: &'static str) -> Option<&'a RawValue> {
         let index = self.fields.iter().position(|field| field.name == name);
@@ -342,49 +304,17 @@ impl<'a> Fields<'a> {
         let null_is_absent = self.null_is_absent && !required;
         match raw {
             Some(raw) if null_is_absent && raw.get() == "null" => None,
-            None if required => self.rejected_as(name, Reason::Missing),
+            None if required => self.rejected_as(name, MISSING),
             raw => raw,
         }
     }
 
-    fn mistyped<T>(
-        &mut self,
-        name: &str,
-        expected: impl Into<Cow<'static, str>>,
-        raw: &RawValue,
-    ) -> Option<T> {
-        let reason = Reason::Mistyped {
-            expected: expected.into(),
-            found: text::found(raw),
-        };
-        self.rejected_as(name, reason)
+    fn mistyped<T>(&mut self, name: &str, expected: &str, raw: &RawValue) -> Option<T> {
+        self.rejected_as(name, &mistyped(expected, raw))
     }
 
-    fn rejected_as<T>(&mut self, name: &str, reason: Reason) -> Option<T> {
-        self.rejections.push(RejectedField {
-            field: format!("{}{name}", self.prefix),
-            reason,
-        });
+    fn rejected_as<T>(&mut self, name: &str, reason: &str) -> Option<T> {
+        self.refuse(name, &reason);
         None
     }
-}
-
-/// The finite number of a value, within `bound`.
-pub(crate) fn finite(raw: &RawValue, bound: Bound) -> Result<f64, Reason> {
-    let Some(value) = json::number(raw) else {
-        return Err(Reason::Mistyped {
-            expected: "a number".into(),
-            found: text::found(raw),
-        });
-    };
-    if !value.is_finite() {
-        return Err(Reason::NotFinite);
-    }
-    if !bound.holds(value) {
-        return Err(Reason::OutOfBounds {
-            bound,
-            found: text::excerpt(raw.get()),
-        });
-    }
-    Ok(value)
 }

@@ -281,36 +281,9 @@ pub enum ProviderOp {
     },
 }
 
-/// The arguments of a call.
-#[derive(Debug, Clone)]
-pub enum Arguments {
-    /// Fields by name; `{}` if `args` was absent or `null`.
-    Object(Payload),
-    /// Fields in documented order.
-    Positional(Payload),
-    /// Any other value. The node that serves the call refuses it, because some services echo their values even then.
-    Neither(Payload),
-}
-
-impl Arguments {
-    /// No arguments: `{}`.
-    #[must_use]
-    pub fn none() -> Self {
-        Self::Object(
-            RawValue::from_string("{}".to_owned())
-                .unwrap_or_default()
-                .into(),
-        )
-    }
-
-    /// The arguments, of any type.
-    #[must_use]
-    pub fn payload(&self) -> &Payload {
-        match self {
-            Self::Object(args) | Self::Positional(args) | Self::Neither(args) => args,
-        }
-    }
-}
+/// The arguments of a call: fields by name, or in documented order in an array; `{}` if they are absent or `null`. The
+/// node that serves the call refuses any other value, because some services echo their values even then.
+pub type Arguments = Payload;
 
 // ---- reading --------------------------------------------------------------------------------------------------------
 
@@ -639,15 +612,8 @@ impl<'a> OpReader<'a> {
     }
 
     fn args(&self) -> Arguments {
-        let Some(args) = self.get("args").map(Payload::from) else {
-            return Arguments::none();
-        };
-        match args.get().as_bytes().first() {
-            Some(b'{') => Arguments::Object(args),
-            Some(b'[') => Arguments::Positional(args),
-            Some(b'n') => Arguments::none(),
-            _ => Arguments::Neither(args),
-        }
+        let args = self.get("args").filter(|args| args.get() != "null");
+        args.map_or_else(Payload::empty_object, Payload::from)
     }
 
     fn timeout(&self) -> Result<Option<Duration>, Problem> {

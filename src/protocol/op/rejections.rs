@@ -2,14 +2,15 @@
 //!
 //! **Invariant:** they are reported in one line of bounded length.
 
-use std::borrow::Cow;
 use std::fmt;
 
-use crate::protocol::wire::text;
+use serde_json::value::RawValue;
+
+use crate::protocol::wire::{json, text};
 
 /// Longest `status` in characters: room for every field of the largest service.
 const MAX_STATUS: usize = 2048;
-/// Longest reason from another layer, in characters.
+/// Longest reason, in characters.
 const MAX_REASON: usize = 256;
 
 /// The required range of a finite number.
@@ -24,7 +25,7 @@ pub enum Bound {
 }
 
 impl Bound {
-    pub(in crate::protocol::op) fn holds(self, value: f64) -> bool {
+    fn holds(self, value: f64) -> bool {
         match self {
             Self::Finite => true,
             Self::Positive => value > 0.0,
@@ -49,62 +50,8 @@ impl fmt::Display for Bound {
 pub struct RejectedField {
     /// The field, with the index of the wrong entry if there is one.
     pub field: String,
-    /// The fault.
-    pub reason: Reason,
-}
-
-/// Why a field was rejected.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Reason {
-    /// A required field is missing.
-    #[error("is required")]
-    Missing,
-    /// Another type or value was expected.
-    #[error("must be {expected}, got {found}")]
-    Mistyped {
-        /// The expected kind of value.
-        expected: Cow<'static, str>,
-        /// The received value, shortened.
-        found: String,
-    },
-    /// `NaN`, infinite, or a literal that overflows.
-    #[error("must be a finite number")]
-    NotFinite,
-    /// Out of bounds.
-    #[error("must be {bound}, got {found}")]
-    OutOfBounds {
-        /// The bound.
-        bound: Bound,
-        /// The client's number, shortened.
-        found: String,
-    },
-    /// Above a limit.
-    #[error("must be at most {limit}, got {found}")]
-    TooLarge {
-        /// The limit.
-        limit: u64,
-        /// The client's number, shortened.
-        found: String,
-    },
-    /// An array of the wrong length.
-    #[error("must have {expected} entries, got {got}")]
-    Length {
-        /// The expected number of entries.
-        expected: usize,
-        /// The received number of entries.
-        got: usize,
-    },
-    /// An array with too many entries. A positional array has at most one for each field of the service.
-    #[error("must have at most {limit} entries, got {got}")]
-    TooMany {
-        /// Most entries.
-        limit: usize,
-        /// Entries of the array.
-        got: usize,
-    },
-    /// Another layer refuses the value, for this reason.
-    #[error("{0}")]
-    Refused(String),
+    /// The fault, which continues the sentence.
+    pub reason: String,
 }
 
 /// The rejected fields of a request, in the order of reading.
@@ -137,13 +84,9 @@ impl Rejections {
         text::shortened(&sentences.join("; "), MAX_STATUS)
     }
 
-    /// Rejects a field for a reason from another layer. The reason continues the sentence after the field's name.
+    /// Rejects a field. The reason continues the sentence after the field's name.
     pub fn refuse(&mut self, field: &str, reason: &impl fmt::Display) {
-        self.push(RejectedField::refused(field, reason));
-    }
-
-    pub(super) fn push(&mut self, rejection: RejectedField) {
-        self.0.push(rejection);
+        self.0.push(RejectedField::refused(field, reason));
     }
 
     /// Replaces a field's name by the sender's name for it.
@@ -166,12 +109,42 @@ impl fmt::Display for Rejections {
 }
 
 impl RejectedField {
-    /// A field that another layer rejects. `reason` continues the sentence after the field's name.
+    /// A rejected field. `reason` continues the sentence after the field's name.
     #[must_use]
     pub fn refused(field: &str, reason: &impl fmt::Display) -> Self {
         Self {
             field: field.to_owned(),
-            reason: Reason::Refused(text::shortened(&reason.to_string(), MAX_REASON)),
+            reason: text::shortened(&reason.to_string(), MAX_REASON),
         }
     }
+}
+
+/// The reason why a required field is rejected that is not there.
+pub(crate) const MISSING: &str = "is required";
+
+/// The reason why a value of another kind is rejected.
+pub(crate) fn mistyped(expected: &str, raw: &RawValue) -> String {
+    format!("must be {expected}, got {}", text::found(raw))
+}
+
+/// The reason why an array of `got` entries is rejected.
+pub(crate) fn too_many(limit: usize, got: usize) -> String {
+    format!("must have at most {limit} entries, got {got}")
+}
+
+/// The reason why an array is rejected that does not have `expected` entries.
+pub(crate) fn wrong_length(expected: usize, got: usize) -> String {
+    format!("must have {expected} entries, got {got}")
+}
+
+/// The finite number of a value, within `bound`, or the reason why it is rejected.
+pub(crate) fn finite(raw: &RawValue, bound: Bound) -> Result<f64, String> {
+    let value = json::number(raw).ok_or_else(|| mistyped("a number", raw))?;
+    if !value.is_finite() {
+        return Err("must be a finite number".to_owned());
+    }
+    if !bound.holds(value) {
+        return Err(mistyped(&bound.to_string(), raw));
+    }
+    Ok(value)
 }

@@ -1,6 +1,7 @@
 //! Messages in the encoding of ROS 2: CDR, little-endian, converted from JSON by their type.
 //!
-//! A field that is absent or of another type becomes zero. A number that is `null` becomes NaN.
+//! A field that is absent or of another type becomes zero, and so does a whole number that does not fit. A number that
+//! is `null` becomes NaN.
 //!
 //! **Invariant:** the offset of every primitive is a multiple of its size, counted from the end of the 4-byte
 //! header.
@@ -45,6 +46,13 @@ pub(super) fn message_type(kind: &str) -> Option<Type> {
     kind.contains('/').then(|| types::find(kind)).flatten()
 }
 
+/// The whole number in a value; 0 if there is none, or if it does not fit.
+fn whole<T: TryFrom<i128> + Default>(value: &MessageTree<'_>) -> T {
+    let number = value.number().and_then(Number::as_i128);
+    let number = number.and_then(|number| T::try_from(number).ok());
+    number.unwrap_or_default()
+}
+
 impl Sink {
     fn message(&mut self, one: Type, msg: &MessageTree<'_>) {
         for field in one.fields {
@@ -80,36 +88,19 @@ impl Sink {
         reason = "a float32 is the nearest one"
     )]
     fn single(&mut self, kind: &str, inner: Option<Type>, value: &MessageTree<'_>) {
-        let number = value.number();
-        let unsigned = || number.and_then(Number::as_u64).unwrap_or_default();
-        let signed = || number.and_then(Number::as_i64).unwrap_or_default();
-        let float = || match value {
-            MessageTree::Null => f64::NAN,
-            _ => number.and_then(Number::as_f64).unwrap_or_default(),
+        let float = || match (value, value.number()) {
+            (MessageTree::Null, _) => f64::NAN,
+            (_, number) => number.and_then(Number::as_f64).unwrap_or_default(),
         };
         match kind {
             "bool" => self.aligned([u8::from(*value == MessageTree::Bool(true))]),
-            "byte" | "uint8" | "char" => {
-                self.aligned([u8::try_from(unsigned()).unwrap_or(u8::MAX)]);
-            }
-            "int8" => {
-                let number = i8::try_from(signed()).unwrap_or_default();
-                self.aligned(number.to_le_bytes());
-            }
-            "uint16" => {
-                let number = u16::try_from(unsigned()).unwrap_or(u16::MAX);
-                self.aligned(number.to_le_bytes());
-            }
-            "int32" => {
-                let number = i32::try_from(signed()).unwrap_or_default();
-                self.aligned(number.to_le_bytes());
-            }
-            "uint32" => {
-                let number = u32::try_from(unsigned()).unwrap_or(u32::MAX);
-                self.aligned(number.to_le_bytes());
-            }
-            "int64" => self.aligned(signed().to_le_bytes()),
-            "uint64" => self.aligned(unsigned().to_le_bytes()),
+            "byte" | "uint8" | "char" => self.aligned(whole::<u8>(value).to_le_bytes()),
+            "int8" => self.aligned(whole::<i8>(value).to_le_bytes()),
+            "uint16" => self.aligned(whole::<u16>(value).to_le_bytes()),
+            "int32" => self.aligned(whole::<i32>(value).to_le_bytes()),
+            "uint32" => self.aligned(whole::<u32>(value).to_le_bytes()),
+            "int64" => self.aligned(whole::<i64>(value).to_le_bytes()),
+            "uint64" => self.aligned(whole::<u64>(value).to_le_bytes()),
             "float32" => self.aligned((float() as f32).to_le_bytes()),
             "float64" => self.aligned(float().to_le_bytes()),
             "string" => self.string(match value {

@@ -35,13 +35,13 @@ pub(super) fn member<'t, 'a>(msg: &'t MessageTree<'a>, field: &str) -> Option<&'
 pub fn with_ros1_names(frame: &[u8]) -> Bytes {
     let mut text = Vec::with_capacity(2 * frame.len());
     let mut rest = frame;
-    while let Some(stamp) = next_stamp(rest) {
-        let (before, behind) = rest.split_at(stamp.end);
+    while let Some((end, seconds, nanoseconds)) = next_stamp(rest) {
+        let (before, behind) = rest.split_at(end);
         text.extend_from_slice(before);
         text.extend_from_slice(b",\"secs\":");
-        text.extend_from_slice(stamp.seconds);
+        text.extend_from_slice(seconds);
         text.extend_from_slice(b",\"nsecs\":");
-        text.extend_from_slice(stamp.nanoseconds);
+        text.extend_from_slice(nanoseconds);
         rest = behind;
     }
     text.extend_from_slice(rest);
@@ -49,16 +49,8 @@ pub fn with_ros1_names(frame: &[u8]) -> Bytes {
     Bytes::from(text)
 }
 
-/// A stamp in a text.
-struct StampText<'a> {
-    /// Its end in the text.
-    end: usize,
-    seconds: &'a [u8],
-    nanoseconds: &'a [u8],
-}
-
-/// The first stamp in `text`.
-fn next_stamp(text: &[u8]) -> Option<StampText<'_>> {
+/// The end of the first stamp in `text`, its seconds and its nanoseconds.
+fn next_stamp(text: &[u8]) -> Option<(usize, &[u8], &[u8])> {
     let mut from = 0;
     loop {
         let found = text.get(from..)?;
@@ -71,11 +63,7 @@ fn next_stamp(text: &[u8]) -> Option<StampText<'_>> {
             continue;
         };
         let (nanoseconds, behind) = number(behind);
-        return Some(StampText {
-            end: text.len() - behind.len(),
-            seconds,
-            nanoseconds,
-        });
+        return Some((text.len() - behind.len(), seconds, nanoseconds));
     }
 }
 

@@ -56,22 +56,6 @@ pub fn describe(joint_names: &[&str], lengths: &[f64], masses: &[f64]) -> String
 mod tests {
     use super::*;
 
-    /// A rod of 3 kg and 2 m has m l² / 12 = 1 kg m². Its joint is at the end of the previous link.
-    #[test]
-    fn a_description_has_the_lengths_the_masses_and_the_rods_inertia() {
-        let xml = describe(&["joint1", "joint2"], &[0.5, 2.0], &[1.0, 3.0]);
-        for part in [
-            "<origin xyz=\"0.5 0 0\"/>",
-            "<mass value=\"3.0\"/>",
-            "izz=\"1.0\"",
-            "<box size=\"2.0 0.05 0.05\"/>",
-            "<child link=\"hand\"/>",
-        ] {
-            assert!(xml.contains(part), "no {part} in {xml}");
-        }
-        assert_eq!(xml.matches("type=\"continuous\"").count(), 2);
-    }
-
     /// Each inertia is greater than 0 and at most the sum of the other two, for every rod.
     #[test]
     fn inertias_are_those_of_a_body() {

@@ -34,58 +34,55 @@ const OVERFLOW: &[u8; 309] = b"\
 /// rest does not change.
 #[must_use]
 pub fn accept_literals(text: String) -> String {
-    let bytes = text.as_bytes();
-    let mut accepted = String::new();
-    let mut copied = 0;
-    let mut at = 0;
-    while let Some(found) = next_of(bytes, at, |byte| matches!(byte, b'"' | b'N' | b'I')) {
-        let literal = match bytes.get(found) {
-            Some(b'"') => {
-                at = string_end(bytes, found);
-                continue;
-            }
-            Some(b'N') => whole_token(bytes, found, "NaN", false).then_some(("NaN", NAN)),
-            _ => whole_token(bytes, found, "Infinity", true).then_some(("Infinity", INFINITY)),
+    let literal = |bytes: &[u8], at| {
+        let (name, literal, is_signed) = match bytes.get(at) {
+            Some(b'N') => ("NaN", NAN, false),
+            _ => ("Infinity", INFINITY, true),
         };
-        at = found + 1;
-        if let Some((name, literal)) = literal {
-            accepted.push_str(text.get(copied..found).unwrap_or_default());
-            accepted.push_str(literal);
-            at = found + name.len();
-            copied = at;
+        match whole_token(bytes, at, name, is_signed) {
+            true => (at + name.len(), Some(literal)),
+            false => (at + 1, None),
         }
-    }
-    if copied == 0 {
-        return text;
-    }
-    accepted.push_str(text.get(copied..).unwrap_or_default());
-    accepted
+    };
+    let accepted = replaced(&text, |byte| matches!(byte, b'N' | b'I'), literal);
+    accepted.unwrap_or(text)
 }
 
 /// Replaces every number that overflows an `f64` by `null`. All other bytes of the valid JSON text `raw` do not change.
 #[must_use]
 pub fn strict(raw: &str) -> Cow<'_, str> {
-    let bytes = raw.as_bytes();
+    let number = |bytes: &[u8], at| {
+        let end = next_of(bytes, at, |byte| !is_numeric(byte)).unwrap_or(bytes.len());
+        let overflows = overflows(bytes.get(at..end).unwrap_or_default());
+        (end, overflows.then_some("null"))
+    };
+    let strict = replaced(raw, |byte| matches!(byte, b'-' | b'0'..=b'9'), number);
+    strict.map_or(Cow::Borrowed(raw), Cow::Owned)
+}
+
+/// The text with other tokens outside strings; `None` if nothing changes. `token` returns the end of the token at a byte
+/// that `begins` accepts, and what replaces it.
+fn replaced(
+    text: &str,
+    begins: impl Fn(u8) -> bool,
+    token: impl Fn(&[u8], usize) -> (usize, Option<&'static str>),
+) -> Option<String> {
+    let bytes = text.as_bytes();
     let mut output = String::new();
-    let mut copied = 0;
-    let mut at = 0;
-    while let Some(found) = next_of(bytes, at, |byte| matches!(byte, b'"' | b'-' | b'0'..=b'9')) {
-        if bytes.get(found) == Some(&b'"') {
-            at = string_end(bytes, found);
-            continue;
-        }
-        at = next_of(bytes, found, |byte| !is_numeric(byte)).unwrap_or(bytes.len());
-        if overflows(bytes.get(found..at).unwrap_or_default()) {
-            output.push_str(raw.get(copied..found).unwrap_or_default());
-            output.push_str("null");
-            copied = at;
+    let (mut copied, mut at) = (0, 0);
+    while let Some(found) = next_of(bytes, at, |byte| byte == b'"' || begins(byte)) {
+        let (end, replacement) = match bytes.get(found) {
+            Some(b'"') => (string_end(bytes, found), None),
+            _ => token(bytes, found),
+        };
+        at = end;
+        if let Some(replacement) = replacement {
+            output.push_str(text.get(copied..found).unwrap_or_default());
+            output.push_str(replacement);
+            copied = end;
         }
     }
-    if copied == 0 {
-        return Cow::Borrowed(raw);
-    }
-    output.push_str(raw.get(copied..).unwrap_or_default());
-    Cow::Owned(output)
+    (copied > 0).then(|| output + text.get(copied..).unwrap_or_default())
 }
 
 /// The value of a JSON number, infinite if the literal overflows; `None` if `raw` is not a number.
@@ -370,6 +367,13 @@ struct Inner {
 }
 
 impl Payload {
+    /// `{}`.
+    #[must_use]
+    pub fn empty_object() -> Self {
+        let object = RawValue::from_string("{}".to_owned());
+        object.unwrap_or_default().into()
+    }
+
     /// The unchanged value: numbers that overflow are still there, so that a reader can refuse them by name.
     #[must_use]
     pub fn raw(&self) -> &RawValue {

@@ -31,12 +31,27 @@ pub(crate) fn shortened(text: &str, limit: usize) -> String {
 
 /// Whether a character controls a terminal: control characters, and characters that end a line or change the direction
 /// of writing. Each has at most four hexadecimal digits.
-pub(crate) fn acts(character: char) -> bool {
+fn acts(character: char) -> bool {
     let turns = matches!(
         character,
         '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}'
     );
     turns || character.is_control()
+}
+
+/// A text with JSON's escapes where a character [acts]. The syntax of JSON has no such character, so each is part of a
+/// text.
+pub(crate) fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len() + 1);
+    for character in text.chars() {
+        if acts(character) {
+            // Writing to a `String` cannot fail.
+            let _ = write!(escaped, "\\u{:04x}", u32::from(character));
+        } else {
+            escaped.push(character);
+        }
+    }
+    escaped
 }
 
 /// Appends a character, escaped where it [acts].

@@ -4,7 +4,6 @@
 //! **Invariant:** a message is taken as a whole, or refused with the reason.
 
 use crate::protocol::catalog::Topic;
-use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::protocol::wire::json::Payload;
 
@@ -22,8 +21,7 @@ pub fn joint_names<const N: usize>() -> [&'static str; N] {
 /// # Errors
 /// If the message does not hold one for each joint.
 pub fn read_effort<const N: usize>(msg: &Payload) -> Result<[f64; N], Rejections> {
-    let args = Arguments::Object(msg.clone());
-    let mut fields = Fields::of_message(&args, Topic::EffortCommands)?;
+    let mut fields = Fields::of_message(msg, Topic::EffortCommands)?;
     let effort = fields.array("data", Bound::Finite);
     effort.ok_or_else(|| fields.finish())
 }

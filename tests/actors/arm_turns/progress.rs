@@ -6,7 +6,7 @@ use std::task::Poll;
 
 use super::*;
 use glam::DVec2;
-use pendularm::actors::arm::sim::{AddBarrier, CommandGoal, GoalOrder, GoalProgress, TrackGoal};
+use pendularm::actors::arm::sim::{CommandGoal, Connect, GoalOrder, GoalProgress, TrackGoal};
 use pendularm::actors::node::Barrier;
 use pendularm::math::goal::Criteria;
 use pendularm::math::kinematics::Target;
@@ -35,7 +35,9 @@ fn progress_of_a_goal_is_sent_step_by_step_however_many_clients_step_the_arm() {
         let before: Rc<RefCell<Vec<usize>>> = Rc::default();
         let (log, barriers) = (Rc::clone(&received), Rc::clone(&before));
         let publisher = stand_in(move |_: Barrier| barriers.borrow_mut().push(log.borrow().len()));
-        bench.arm.send(AddBarrier(publisher)).await.unwrap();
+        let owners = vec![publisher];
+        let study = None;
+        bench.arm.send(Connect { study, owners }).await.unwrap();
         let long = SetIntegrator {
             timestep: Some(1.0),
             ..SetIntegrator::default()

@@ -123,7 +123,7 @@ fn at_the_end_the_steps_that_are_left_are_refused() {
         bench.until_answers(3).await;
         assert_eq!(bench.snapshot().await.steps(), 3 * STEPS_IN_A_ROW);
         for (_, answer) in bench.answers() {
-            assert_eq!(answer, Answer::Unserved(Unserved::Refused("shutting down")));
+            assert_eq!(answer, Answer::Unserved(Unserved("shutting down")));
         }
     });
 }

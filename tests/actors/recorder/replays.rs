@@ -50,7 +50,7 @@ fn a_divergence_is_reached_again_at_its_step() {
         sleep(ms(100)).await;
         stop(&stage).await;
         let entries = notes.entries();
-        let diverged = |entry: &RecordEntry| matches!(&entry.content, Content::Input { note, .. } if note == "\"diverged\"");
+        let diverged = |entry: &RecordEntry| matches!(&entry.content, Content::Input { note, .. } if note == "{\"diverged\":null}");
         let at = entries.iter().position(diverged).expect("it diverges");
         assert_eq!(replayed(&entries).difference, None);
 

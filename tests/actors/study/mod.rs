@@ -19,7 +19,7 @@ use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
-    ArmSettings, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetLimitPredictor, SetParams,
+    ArmSettings, Connect, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetParams,
 };
 use pendularm::actors::compute::study::{
     IntegrationStep, PlanRun, PredictStability, Refused, RunOffline, Study, SuggestGains,

@@ -45,7 +45,7 @@ fn light_requests_are_answered_between_slices_of_heavy_ones() {
         heavy.gone.store(true, Ordering::Relaxed);
         assert!(timeout(PATIENCE, heavy.ended).await.is_ok());
         assert_eq!(bench.next().await, 1);
-        assert!(matches!(heavy.answer.await, Ok(Err(Unserved::CallerGone))));
+        assert!(matches!(heavy.answer.await, Ok(Err(Unserved::CALLER_GONE))));
     });
 }
 

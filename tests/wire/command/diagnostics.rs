@@ -1,4 +1,4 @@
-//! `diagnostics`: its page, and its exit status.
+//! `diagnostics`: its output, and its exit status.
 
 use serde_json::json;
 
@@ -6,10 +6,11 @@ use super::{ask, json_of, said};
 use crate::common::Runtime;
 
 #[test]
-fn diagnostics_are_a_page_and_their_exit_status_shows_whether_every_part_is_ok() {
+fn diagnostics_are_printed_and_their_exit_status_shows_whether_every_part_is_ok() {
     let runtime = Runtime::start();
-    let page = said(&runtime, "diagnostics");
-    assert!(page.starts_with("OK arm_sim: running\n  state "), "{page}");
+    let yaml = said(&runtime, "diagnostics");
+    let ok = "- level: 0\n  name: arm_sim\n  message: running\n";
+    assert!(yaml.contains(ok), "{yaml}");
     assert_eq!(json_of(&runtime, "diagnostics")["status"][0]["level"], 0);
     let mut client = runtime.connect();
     client.ask(
@@ -25,8 +26,8 @@ fn diagnostics_are_a_page_and_their_exit_status_shows_whether_every_part_is_ok()
     });
     let output = ask(&runtime, "diagnostics");
     assert_eq!(output.status.code(), Some(1));
-    let page = String::from_utf8(output.stdout).unwrap();
-    assert!(page.starts_with("ERROR arm_sim: diverged: "), "{page}");
+    let yaml = String::from_utf8(output.stdout).unwrap();
+    assert!(yaml.contains("- level: 2\n  name: arm_sim\n"), "{yaml}");
     let complaint = String::from_utf8(output.stderr).unwrap();
     assert!(
         complaint.starts_with("pendularm: arm_sim: diverged"),

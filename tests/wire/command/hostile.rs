@@ -28,7 +28,7 @@ fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
                 return then(&mut stream);
             }
             let value = json!("one\u{1b}[2J\nother").to_string();
-            let values = json!({"type": "std_msgs/msg/String", "topics": ["/t", "/diagnostics"], "successful": true,
+            let values = json!({"type": "std_msgs/msg/String", "topics": ["/t"], "successful": true,
                 "reason": "", "value": value});
             let answer = json!({"op": "service_response", "id": said["id"], "values": values, "result": true});
             stream.write_all(format!("{answer}\n").as_bytes()).unwrap();
@@ -125,42 +125,15 @@ fn hold(stream: &mut TcpStream) {
     let _ = io::copy(stream, &mut io::sink());
 }
 
-/// Publishes this text on the topic, once.
-fn say(topic: &'static str, msg: String) -> impl Fn(&mut TcpStream) + Send {
+/// Publishes this message on the topic, once.
+fn say(msg: String) -> impl Fn(&mut TcpStream) + Send {
     move |stream| {
         // A client at its limit does not read the rest.
         let _ = writeln!(
             stream,
-            "{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{msg}}}"
+            "{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}"
         );
         hold(stream);
-    }
-}
-
-/// A message of `/diagnostics` with these keys, each of the value `v`.
-fn parts(keys: &[&str]) -> String {
-    let values: Vec<Value> = keys
-        .iter()
-        .map(|key| json!({"key": key, "value": "v"}))
-        .collect();
-    let part = json!({"level": 0, "name": "a", "message": "b", "values": values});
-    json!({ "status": [part] }).to_string()
-}
-
-#[test]
-fn a_long_key_of_diagnostics_pads_no_other_line() {
-    let longest = "k".repeat(70_000);
-    let long = &longest[..60_000];
-    let mut many = vec![""; 10_000];
-    many.push(long);
-    for (keys, limit) in [(vec!["a", &longest], 80_000), (many, 600_000)] {
-        let address = server(say("/diagnostics", parts(&keys)));
-        let (status, out, complaint) = end(start(&["diagnostics"], &address));
-        assert_eq!((status, complaint.as_str()), (Some(0), ""));
-        assert_eq!(out.lines().count(), 1 + keys.len());
-        assert!(out.lines().nth(1).unwrap().ends_with("  v"));
-        let key = keys.last().unwrap();
-        assert!(out.ends_with(&format!("\n  {key}  v\n")) && out.len() < limit);
     }
 }
 
@@ -196,7 +169,7 @@ fn values_that_say_nothing_to_a_command_are_not_spread_out() {
 fn yaml_is_printed_before_all_of_it_is_written() {
     let (depth, count) = (120, 1_000_000);
     let msg = "[".repeat(depth) + &"1,".repeat(count) + "1" + &"]".repeat(depth);
-    let address = server(say("/t", msg));
+    let address = server(say(msg));
     let arguments = [&ECHO[..], &["--once"]].concat();
     let mut child = start_within(200_000, &arguments, &address);
     let lines = BufReader::new(child.stdout.take().unwrap()).lines();

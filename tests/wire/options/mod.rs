@@ -8,9 +8,9 @@ mod program;
 mod values;
 mod variables;
 
-use pendularm::options::{Options, Parsed, UsageError};
+use pendularm::options::{Options, Parsed};
 
-fn parse(arguments: &[&str]) -> Result<Parsed, UsageError> {
+fn parse(arguments: &[&str]) -> Result<Parsed, String> {
     Options::parse(["pendularm"].iter().chain(arguments))
 }
 

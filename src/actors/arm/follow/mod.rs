@@ -35,6 +35,8 @@ pub const PERIOD: Duration = Duration::from_millis(5);
 
 /// The reason of a goal that a reset ends.
 const RESET: &str = "the arm was reset";
+/// The reason of a goal that ends because the arm has ended.
+const NO_ANSWER: &str = "the arm does not answer";
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -103,7 +105,7 @@ impl<const N: usize> Handler<ForwardGoal<FollowPath<N>>> for PathFollower<N> {
         let pose = self.arm.send(ArmPose).into_actor(self);
         ctx.wait(pose.map(|pose, node, ctx| match pose {
             Ok(pose) => node.begin(goal, &pose, ctx),
-            Err(_) => goal.client.refuse("the arm does not answer"),
+            Err(_) => goal.client.refuse(NO_ANSWER),
         }));
     }
 }
@@ -148,11 +150,6 @@ impl<const N: usize> Handler<ShutDown> for PathFollower<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ActivePath<N> {
-    /// Whether the arm has been reset since the goal began.
-    fn is_before_reset(&self, pose: &Pose<N>) -> bool {
-        pose.resets != self.resets
-    }
-
     fn end(&self, status: GoalStatus, code: ResultCode, why: &str) {
         self.client.conclude(result(code, why), status);
     }
@@ -211,7 +208,7 @@ impl<const N: usize> PathFollower<N> {
         let pose = self.arm.send(ArmPose).into_actor(self);
         pose.map(|pose, node, ctx| match pose {
             Ok(pose) => node.lead(&pose, None, ctx),
-            Err(_) => node.abort("the arm does not answer"),
+            Err(_) => node.abort(NO_ANSWER),
         })
     }
 
@@ -219,7 +216,7 @@ impl<const N: usize> PathFollower<N> {
         let Some(goal) = &mut self.active else {
             return;
         };
-        if goal.is_before_reset(pose) {
+        if goal.resets != pose.resets {
             return self.abort(RESET);
         }
         if let Some(obstacle) = pose.obstacle {
@@ -243,16 +240,17 @@ impl<const N: usize> PathFollower<N> {
         };
         let moved = self.setpoint.send(moved).into_actor(self);
         ctx.wait(moved.map(move |moved, node, ctx| {
-            node.moved(moved.unwrap_or(false), standing, ctx);
+            match moved {
+                Ok(Ok(())) => node.go_along(standing, ctx),
+                Ok(Err(resets)) => node.give_way(resets),
+                Err(_) => node.abort(NO_ANSWER),
+            }
             drop(done);
         }));
     }
 
-    /// Handles the answer: the setpoint has been moved, or another one has replaced it.
-    fn moved(&mut self, is_ours: bool, standing: Standing, ctx: &mut Context<Self>) {
-        if !is_ours {
-            return self.tell_why(ctx);
-        }
+    /// The setpoint has been moved: sets the timer for the next move, or ends the goal.
+    fn go_along(&mut self, standing: Standing, ctx: &mut Context<Self>) {
         let (status, code, why) = match standing {
             Standing::Moving => {
                 if let Some(before) = self.timer.take() {
@@ -276,20 +274,15 @@ impl<const N: usize> PathFollower<N> {
         }
     }
 
-    /// Ends the goal: another setpoint or a reset has replaced its own since the last check.
-    fn tell_why(&self, ctx: &mut Context<Self>) {
-        let pose = self.arm.send(ArmPose).into_actor(self);
-        ctx.wait(pose.map(|pose, node, _| {
-            let goal = node.active.as_ref();
-            let reset = goal
-                .zip(pose.ok())
-                .is_some_and(|(goal, pose)| goal.is_before_reset(&pose));
-            node.abort(if reset {
-                RESET
-            } else {
-                "another setpoint has taken its place"
-            });
-        }));
+    /// Ends the goal: another setpoint or a reset, the last of `resets`, has replaced its own.
+    fn give_way(&mut self, resets: u64) {
+        let goal = self.active.as_ref();
+        let is_reset = goal.is_some_and(|goal| goal.resets != resets);
+        self.abort(if is_reset {
+            RESET
+        } else {
+            "another setpoint has taken its place"
+        });
     }
 
     /// Ends the goal. Its setpoint has been replaced or is no longer moved.

@@ -40,10 +40,16 @@ pub struct ArmSettings<const N: usize>;
 #[rtype(result = "Option<ClockLimits>")]
 pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
 
-/// The node that computes [`HeldLimit`]. From the runtime, once. Without it an arm has no limits.
+/// The nodes around the arm. From the runtime, once.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub struct SetLimitPredictor<const N: usize>(pub Recipient<HeldLimit<N>>);
+pub struct Connect<const N: usize> {
+    /// The node that computes [`HeldLimit`]. Without it an arm has no limits.
+    pub study: Option<Recipient<HeldLimit<N>>>,
+    /// The actors that inform clients of goals: the registry, `ik_action` and `joint_trajectory_controller`. The arm
+    /// sends them a [`Barrier`] before it reports that it is at rest, and between steps on request.
+    pub owners: Vec<Recipient<Barrier>>,
+}
 
 /// Sets the listener of the journal, or none. From the recorder.
 #[derive(Message)]
@@ -68,12 +74,6 @@ pub struct TrackGoal<const N: usize> {
     /// The receiver of feedback and of the end, unless the end is the answer to its own message.
     pub owner: Recipient<GoalProgress<N>>,
 }
-
-/// This actor informs clients of goals, so the arm sends it a [`Barrier`] before it reports that it is at rest, and
-/// between steps on request. From the runtime, for the registry, `ik_action` and `joint_trajectory_controller`.
-#[derive(Message, Debug, Clone)]
-#[rtype(result = "()")]
-pub struct AddBarrier(pub Recipient<Barrier>);
 
 /// Holds the goal's setpoint from the next step on, and checks the goal, unless it has ended. From `ik_action`.
 #[derive(Message, Debug, Clone, Copy)]
@@ -110,10 +110,10 @@ pub struct SetSetpoint<const N: usize> {
     pub done: Option<Done>,
 }
 
-/// Moves the setpoint, if it is still the sender's last one. The answer is whether it was. From
+/// Moves the setpoint, if it is still the sender's last one. If not, the answer is the number of resets of the arm. From
 /// `joint_trajectory_controller`.
 #[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "bool")]
+#[rtype(result = "Result<(), u64>")]
 pub struct MoveSetpoint<const N: usize> {
     /// The sender's last setpoint.
     pub from: Setpoint<N>,

@@ -13,8 +13,8 @@ mod turn;
 mod world;
 
 pub use self::messages::{
-    AddBarrier, ArmPose, ArmSettings, CommandEffort, CommandGoal, EndGoal, HeldLimit, MoveSetpoint,
-    SetLimitPredictor, SetListener, SetSetpoint, SimulationTime, Snapshot, TakeSnapshot, TrackGoal,
+    ArmPose, ArmSettings, CommandEffort, CommandGoal, Connect, EndGoal, HeldLimit, MoveSetpoint,
+    SetListener, SetSetpoint, SimulationTime, Snapshot, TakeSnapshot, TrackGoal,
 };
 pub use self::node::ArmSim;
 pub use self::orders::ArmOrder;

@@ -16,7 +16,7 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
-use super::messages::{AddBarrier, ArmSettings, HeldLimit, SetLimitPredictor};
+use super::messages::{ArmSettings, Connect, HeldLimit};
 use super::turn::Turn;
 use super::world::ArmWorld;
 use crate::actors::node::{Barrier, Interest, Publish, Reply};
@@ -123,19 +123,12 @@ impl<const N: usize> Handler<ArmSettings<N>> for ArmSim<N> {
     }
 }
 
-impl<const N: usize> Handler<SetLimitPredictor<N>> for ArmSim<N> {
+impl<const N: usize> Handler<Connect<N>> for ArmSim<N> {
     type Result = ();
 
-    fn handle(&mut self, SetLimitPredictor(study): SetLimitPredictor<N>, _: &mut Context<Self>) {
-        self.study = Some(study);
-    }
-}
-
-impl<const N: usize> Handler<AddBarrier> for ArmSim<N> {
-    type Result = ();
-
-    fn handle(&mut self, AddBarrier(owner): AddBarrier, _: &mut Context<Self>) {
-        self.owners.push(owner);
+    fn handle(&mut self, Connect { study, owners }: Connect<N>, _: &mut Context<Self>) {
+        self.study = study.or(self.study.take());
+        self.owners.extend(owners);
     }
 }
 

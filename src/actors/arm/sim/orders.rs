@@ -91,12 +91,12 @@ impl<const N: usize> ArmOrder<N> for SetSetpoint<N> {
 }
 
 impl<const N: usize> ArmOrder<N> for MoveSetpoint<N> {
-    fn perform(self, node: &mut ArmSim<N>) -> bool {
-        let is_known = *node.arm.simulation.pid().setpoint() == self.from;
-        if is_known {
-            node.arm.change(ArmInput::Setpoint(self.to));
+    fn perform(self, node: &mut ArmSim<N>) -> Result<(), u64> {
+        if *node.arm.simulation.pid().setpoint() != self.from {
+            return Err(node.arm.pose().resets);
         }
-        is_known
+        node.arm.change(ArmInput::Setpoint(self.to));
+        Ok(())
     }
 }
 
@@ -112,19 +112,11 @@ impl<const N: usize> ArmOrder<N> for CommandEffort<N> {
 
 /// Adds the topics to the registry's table.
 pub(super) fn listen<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
-    let node = arm.clone();
-    let hold = move |message: TopicMessage| match read_setpoint(&message.msg) {
-        Ok(setpoint) => node.do_send(SetSetpoint {
-            setpoint,
-            done: Some(message.done),
-        }),
-        Err(why) => message.refuse(Topic::JointTrajectory, &why),
+    let hold = |setpoint, message: TopicMessage| SetSetpoint {
+        setpoint,
+        done: Some(message.done),
     };
-    nodes.listen(Topic::JointTrajectory, hold);
-    let node = arm.clone();
-    let command = move |message: TopicMessage| match read_effort(&message.msg) {
-        Ok(effort) => node.do_send(CommandEffort { effort, message }),
-        Err(why) => message.refuse(Topic::EffortCommands, &why),
-    };
-    nodes.listen(Topic::EffortCommands, command);
+    nodes.listen(Topic::JointTrajectory, arm.clone(), read_setpoint, hold);
+    let command = |effort, message| CommandEffort { effort, message };
+    nodes.listen(Topic::EffortCommands, arm.clone(), read_effort, command);
 }

@@ -73,7 +73,7 @@ impl<const N: usize> Handler<ShutDown> for ArmSim<N> {
     fn handle(&mut self, ShutDown(why): ShutDown, ctx: &mut Context<Self>) {
         self.count_message(ctx);
         for mut steps in self.steps.drain(..) {
-            steps.reply.refuse(Unserved::Refused(why));
+            steps.reply.refuse(Unserved(why));
         }
     }
 }
@@ -127,7 +127,7 @@ impl<const N: usize> ArmSim<N> {
     /// Takes the next row of steps. Answers after the last one, otherwise puts the request at the end of the queue.
     fn take_row(&mut self, mut steps: Steps<N>) {
         if steps.reply.caller_is_gone() {
-            return steps.reply.refuse(Unserved::CallerGone);
+            return steps.reply.refuse(Unserved::CALLER_GONE);
         }
         let (stepped, progress) = self.arm.take_row(&mut steps.asked);
         if let (Some(progress), Some(owner)) = (progress, &self.arm.world.owner) {

@@ -6,7 +6,7 @@
 //! **Invariant:** between two ends of a turn the arm does about two milliseconds of work, at any length of the mailbox:
 //! [`TURN`], one message, and one row of steps. Due steps have their own budget.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::actors::resources::work_clock;
 
@@ -17,7 +17,7 @@ pub const TURN_MESSAGES: usize = 64;
 
 /// The messages since the timers were last polled.
 pub(super) struct Turn {
-    began: Instant,
+    began: Duration,
     messages: usize,
 }
 

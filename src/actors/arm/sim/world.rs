@@ -32,7 +32,7 @@ impl<const N: usize> World<N> for ArmWorld<N> {
     }
 
     fn work_time(&self) -> Duration {
-        work_clock::reading()
+        work_clock::now()
     }
 
     fn publish(&self, topic: Topic, write: impl FnOnce() -> Bytes + Send + 'static) {

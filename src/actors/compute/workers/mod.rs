@@ -10,7 +10,7 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::actors::panics::contain;
 use crate::actors::resources::priority::lower_priority;
@@ -35,8 +35,8 @@ pub enum Progress {
 
 /// A long computation that is done in slices.
 pub trait Computation: Send {
-    /// Works until `deadline` or its end, and sends the answer at its end.
-    fn advance(&mut self, deadline: Instant) -> Progress;
+    /// Works until the [work clock](work_clock) shows `deadline` or to its end, and sends the answer at its end.
+    fn advance(&mut self, deadline: Duration) -> Progress;
 
     /// Sends the answer that the runtime is ending. The computation is dropped afterwards.
     fn refuse(&mut self, why: &'static str);

@@ -13,7 +13,7 @@ struct Counting {
 }
 
 impl Computation for Counting {
-    fn advance(&mut self, _deadline: Instant) -> Progress {
+    fn advance(&mut self, _: Duration) -> Progress {
         assert!(self.name != "panics", "asked to");
         self.log.send(self.name.to_owned()).unwrap();
         self.slices -= 1;
@@ -48,7 +48,7 @@ struct InitiallyFull {
 }
 
 impl Computation for InitiallyFull {
-    fn advance(&mut self, _deadline: Instant) -> Progress {
+    fn advance(&mut self, _: Duration) -> Progress {
         if self.tries > 0 {
             self.tries -= 1;
             return Progress::Waiting;
@@ -64,7 +64,7 @@ impl Computation for InitiallyFull {
 struct Endless(mpsc::Receiver<()>);
 
 impl Computation for Endless {
-    fn advance(&mut self, _deadline: Instant) -> Progress {
+    fn advance(&mut self, _: Duration) -> Progress {
         match self.0.try_recv() {
             Err(mpsc::TryRecvError::Empty) => Progress::Unfinished,
             _ => Progress::Finished,

@@ -54,7 +54,7 @@ impl Registry {
                             from: origin.from,
                             service,
                             id: origin.id.as_ref(),
-                            args: call.args.payload(),
+                            args: &call.args,
                         });
                     }
                     let address = Address::new(service, call.service.into_boxed_str(), origin.id)
@@ -78,7 +78,7 @@ impl Registry {
             }
         } else {
             let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
-            let args = call.args.payload();
+            let args = &call.args;
             let encode = |spelling: &str, id: &str| messages::call(spelling, id, args);
             let name = (&*call.service, &call.args);
             self.forward(
@@ -128,7 +128,7 @@ impl Registry {
                 Err(why) => Err(why),
             }
         } else {
-            let (type_name, args) = (goal.type_name.as_deref(), goal.args.payload());
+            let (type_name, args) = (goal.type_name.as_deref(), &goal.args);
             let encode = |spelling: &str, id: &str| {
                 messages::action_goal(spelling, id, type_name, args, goal.feedback)
             };
@@ -285,7 +285,7 @@ impl Registry {
                 Served::Action => Refusal::NoAction(name.to_owned()),
             });
         };
-        if matches!(args, Arguments::Neither(_)) {
+        if !args.get().starts_with(['{', '[']) {
             return Err(Refusal::BadArguments);
         }
         let server = self.clients.get(&provider.connection);

@@ -144,16 +144,13 @@ impl<const N: usize> Handler<SubscribeFrames<N>> for TfRepublisher<N> {
 
     fn handle(&mut self, subscription: SubscribeFrames<N>, ctx: &mut Context<Self>) {
         self.forget_gone();
-        let of_client =
-            |(one, _): &(SubscribeFrames<N>, Instant)| one.client() == subscription.client();
-        let oldest = self.subscriptions.iter().position(of_client);
-        if self
-            .subscriptions
-            .iter()
-            .filter(|one| of_client(one))
-            .count()
-            >= MAX_FRAME_SUBSCRIPTIONS
-            && let Some((oldest, _)) = oldest.and_then(|at| self.subscriptions.remove(at))
+        let client = subscription.client();
+        let all = self.subscriptions.iter().enumerate();
+        let own = all.filter(|(_, (one, _))| one.client() == client);
+        let own: Vec<usize> = own.map(|(at, _)| at).collect();
+        if let [oldest, ..] = own[..]
+            && own.len() >= MAX_FRAME_SUBSCRIPTIONS
+            && let Some((oldest, _)) = self.subscriptions.remove(oldest)
         {
             oldest.end(GoalStatus::Aborted, TOO_MANY);
         }
@@ -180,10 +177,8 @@ impl<const N: usize> Handler<CancelSent> for TfRepublisher<N> {
             FrameReceiver::Client(client) => client.is(&cancel.goal),
             FrameReceiver::Topic { .. } => false,
         };
-        let at = self
-            .subscriptions
-            .iter()
-            .position(|(subscription, _)| is_meant(subscription));
+        let mut all = self.subscriptions.iter();
+        let at = all.position(|(subscription, _)| is_meant(subscription));
         match at.and_then(|at| self.subscriptions.remove(at)) {
             Some((subscription, _)) => subscription.end(GoalStatus::Canceled, Empty {}),
             None => cancel.refuse(NOT_KEPT),
@@ -304,11 +299,8 @@ impl<const N: usize> TfRepublisher<N> {
         due.sort_by_key(|(_, due)| *due);
         for (order, (subscription, due)) in (0..).zip(due.into_iter().take(AT_ONCE)) {
             // A nanosecond keeps the order, so requests that are always due take turns.
-            *due = next(
-                *due,
-                subscription.goal.period,
-                now + Duration::from_nanos(order),
-            );
+            let sent = now + Duration::from_nanos(order);
+            *due = next(*due, subscription.goal.period, sent);
             let message = seen(&subscription.goal.target, &subscription.goal.sources);
             match &subscription.by {
                 FrameReceiver::Client(client) => client.feed_back(message),

@@ -2,13 +2,12 @@
 //!
 //! **Invariant:** a request names only frames of the arm. Others are refused by name.
 
-use std::sync::Weak;
+use std::borrow::Cow;
 use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
 use serde_json::json;
-use serde_json::value::RawValue;
 
 use super::{
     FrameGoal, FrameReceiver, MAX_FRAMES, RepublishTfs, SubscribeFrames, TfRepublisher,
@@ -20,8 +19,8 @@ use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::scene::{WORLD, is_frame};
 use crate::protocol::op::Arguments;
-use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
-use crate::protocol::wire::{json, text};
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::protocol::wire::json::Payload;
 
 /// Default rate in messages per second.
 const RATE: f64 = 10.0;
@@ -33,20 +32,17 @@ impl<const N: usize> TfRepublisher<N> {
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<RepublishTfs>(Service::RepublishTfs, address.clone());
         nodes.carry_out::<FrameGoal<N>, _>(address.clone());
-        let node = address.clone();
-        nodes.listen(Topic::TfWebGoal, move |message| {
-            match read_goal::<N>(&message) {
-                Ok(goal) => node.do_send(goal),
-                Err(rejections) => message.refuse(Topic::TfWebGoal, &rejections),
-            }
-        });
-        let node = address.clone();
-        nodes.listen(Topic::TfWebCancel, move |message| {
-            match read_cancel(message.msg.raw()) {
-                Ok(id) => node.do_send(UnsubscribeFrames(id)),
-                Err(rejections) => message.refuse(Topic::TfWebCancel, &rejections),
-            }
-        });
+        let subscribe = |(id, goal), message: TopicMessage| {
+            let by = FrameReceiver::Topic {
+                id,
+                connection: message.connection,
+                listening: message.listening,
+            };
+            SubscribeFrames { goal, by }
+        };
+        nodes.listen(Topic::TfWebGoal, address.clone(), read_goal::<N>, subscribe);
+        let cancel = |id, _| UnsubscribeFrames(id);
+        nodes.listen(Topic::TfWebCancel, address.clone(), read_cancel, cancel);
         for topic in [Topic::TfWeb, Topic::TfWebFeedback] {
             nodes.publishers.insert(topic, address.clone().recipient());
         }
@@ -91,7 +87,14 @@ impl<const N: usize> Goal for FrameGoal<N> {
     const ACTION: Action = Action::TfSubscription;
 
     fn read(arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::of_goal(arguments, Action::TfSubscription)?;
+        let mut fields = Fields::of_goal(arguments, Self::ACTION)?;
+        let goal = Self::of(&mut fields);
+        fields.accept(goal)
+    }
+}
+
+impl<const N: usize> FrameGoal<N> {
+    fn of(fields: &mut Fields<'_>) -> Self {
         let sources = fields.texts("source_frames", MAX_FRAMES);
         let is_long = |name: &String| name.len() > MAX_NAME;
         if sources.iter().flatten().any(is_long) {
@@ -104,60 +107,39 @@ impl<const N: usize> Goal for FrameGoal<N> {
             let why = format!("must be a frame of the arm, got {target}");
             fields.refuse("target_frame", &why);
         }
-        check_thresholds(&mut fields);
+        check_thresholds(fields);
         let rate = rate.filter(|rate| *rate > 0.0).unwrap_or(RATE);
-        fields.accept(Self {
+        Self {
             sources: sources.unwrap_or_default(),
             target: target.unwrap_or_default().into_owned(),
             period: Duration::from_secs_f64(rate.max(LEAST_RATE).recip()),
-        })
+        }
     }
 }
 
 // ---- the topics of ROS 1's actions ----------------------------------------------------------------------------------
 
-/// `tf2_web_republisher/TFSubscriptionActionGoal`.
-fn read_goal<const N: usize>(message: &TopicMessage) -> Result<SubscribeFrames<N>, Rejections> {
-    let [id, goal] = members(message.msg.raw(), &["goal_id", "goal"])?;
-    let id = id.and_then(|id| json::members(id.get(), &["id"]).ok());
-    let id = id.and_then(|[id]| json::text(id?));
-    let id = id.ok_or_else(|| refused("goal_id.id", &"must be a string"))?;
-    if id.len() > MAX_NAME {
-        let why = format!("must be at most {MAX_NAME} bytes long");
-        return Err(refused("goal_id.id", &why));
+/// The id and the goal of a `tf2_web_republisher/TFSubscriptionActionGoal`.
+fn read_goal<const N: usize>(msg: &Payload) -> Result<(String, FrameGoal<N>), Rejections> {
+    let mut fields = Fields::of_message(msg, Topic::TfWebGoal)?;
+    let id = fields.object("goal_id", |fields| {
+        let id = fields.text("id").unwrap_or_default();
+        if id.len() > MAX_NAME {
+            fields.refuse("id", &format!("must be at most {MAX_NAME} bytes long"));
+        }
+        id.into_owned()
+    });
+    let goal = fields.object("goal", FrameGoal::of);
+    match id.zip(goal) {
+        Some(read) => fields.accept(read),
+        None => Err(fields.finish()),
     }
-    let id = id.into_owned();
-    let goal = goal.ok_or_else(|| refused("goal", &"is required"))?;
-    let goal = Goal::read(&Arguments::Object(goal.into()))?;
-    let by = FrameReceiver::Topic {
-        id,
-        connection: message.connection,
-        listening: Weak::clone(&message.listening),
-    };
-    Ok(SubscribeFrames { goal, by })
 }
 
-/// `actionlib_msgs/GoalID`: an id, or none for all goals.
-fn read_cancel(msg: &RawValue) -> Result<Option<String>, Rejections> {
-    let [id] = members(msg, &["id"])?;
-    let Some(id) = id else {
-        return Ok(None);
-    };
-    let text = json::text(id).ok_or_else(|| {
-        let found = text::found(id);
-        refused("id", &format!("must be a string, got {found}"))
-    })?;
-    Ok(Some(text.into_owned()).filter(|id| !id.is_empty()))
-}
-
-/// The members of these names in a message.
-fn members<'a, const M: usize>(
-    msg: &'a RawValue,
-    names: &[&str; M],
-) -> Result<[Option<&'a RawValue>; M], Rejections> {
-    json::members(msg.get(), names).map_err(|_| refused("msg", &"must be an object"))
-}
-
-fn refused(field: &str, why: &impl std::fmt::Display) -> Rejections {
-    RejectedField::refused(field, why).into()
+/// The id of an `actionlib_msgs/GoalID`, or none for all goals.
+fn read_cancel(msg: &Payload) -> Result<Option<String>, Rejections> {
+    let mut fields = Fields::of_message(msg, Topic::TfWebCancel)?;
+    let id = fields.text("id").filter(|id| !id.is_empty());
+    let id = id.map(Cow::into_owned);
+    fields.accept(id)
 }

@@ -4,10 +4,7 @@
 //! node `/gateway`.
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
 use std::sync::Arc;
-
-use serde_json::{Value, json};
 
 use crate::protocol::catalog::rosapi::{PREFIX, PRIVATE_PREFIX};
 use crate::protocol::catalog::{Action, Direction, Node, Rosapi, Service, Topic};
@@ -65,24 +62,19 @@ pub struct ListedService {
     pub type_name: Option<Arc<str>>,
 }
 
-/// A topic, and the nodes that use it.
-pub(super) struct TopicRow<'a> {
-    pub(super) name: &'a str,
+/// A topic, a service or an action, and its nodes.
+pub(super) struct Row<'a> {
+    pub(super) name: Cow<'a, str>,
     /// Empty if it is not known.
     pub(super) type_name: &'a str,
+    /// The nodes that publish the topic, or serve the service or action.
     pub(super) publishers: Vec<Node>,
+    /// The nodes that subscribe to the topic.
     pub(super) subscribers: Vec<Node>,
 }
 
-/// A service or an action, and its node.
-pub(super) struct ServedRow<'a> {
-    pub(super) name: Cow<'a, str>,
-    pub(super) type_name: Option<&'a str>,
-    pub(super) node: Node,
-}
-
 /// All topics.
-pub(super) fn topics(census: &Census) -> Vec<TopicRow<'_>> {
+pub(super) fn topics(census: &Census) -> Vec<Row<'_>> {
     let own = Topic::ALL.into_iter().map(|topic| {
         let owner = vec![topic.owner()];
         let (publishers, subscribers) = match (topic, topic.direction()) {
@@ -91,103 +83,63 @@ pub(super) fn topics(census: &Census) -> Vec<TopicRow<'_>> {
             (_, Direction::Published) => (owner, vec![]),
             (_, Direction::Subscribed) => (vec![], owner),
         };
-        TopicRow {
-            name: topic.name(),
+        Row {
+            name: topic.name().into(),
             type_name: topic.type_name(),
             publishers,
             subscribers,
         }
     });
-    let mut rows: Vec<TopicRow<'_>> = own.collect();
+    let mut rows: Vec<Row<'_>> = own.collect();
     for listed in &census.topics {
-        let mut own = rows.iter().take(Topic::ALL.len());
-        let own = own.position(|row| *row.name == *listed.name);
-        let at = own.unwrap_or(rows.len());
-        if own.is_none() {
-            rows.push(TopicRow {
-                name: &listed.name,
+        let publishers = listed.published.then_some(Node::Gateway).into_iter();
+        let subscribers = listed.subscribed.then_some(Node::Gateway).into_iter();
+        let mut own = rows.iter_mut().take(Topic::ALL.len());
+        if let Some(row) = own.find(|row| *row.name == *listed.name) {
+            row.publishers.extend(publishers);
+            row.subscribers.extend(subscribers);
+        } else {
+            rows.push(Row {
+                name: (&*listed.name).into(),
                 type_name: listed.type_name.as_deref().unwrap_or_default(),
-                publishers: vec![],
-                subscribers: vec![],
+                publishers: publishers.collect(),
+                subscribers: subscribers.collect(),
             });
-        }
-        if let Some(row) = rows.get_mut(at) {
-            row.publishers
-                .extend(listed.published.then_some(Node::Gateway));
-            row.subscribers
-                .extend(listed.subscribed.then_some(Node::Gateway));
         }
     }
     rows
 }
 
 /// All services.
-pub(super) fn services(census: &Census) -> Vec<ServedRow<'_>> {
+pub(super) fn services(census: &Census) -> Vec<Row<'_>> {
     let own = own_services().flat_map(|service| {
         let names = service_names(service).into_iter();
-        names.map(move |name| ServedRow {
-            name: name.into(),
-            type_name: Some(service.type_name()),
-            node: service.owner(),
-        })
+        names.map(move |name| served(name, service.type_name(), service.owner()))
     });
     own.chain(of_clients(&census.services)).collect()
 }
 
 /// All actions.
-pub(super) fn actions(census: &Census) -> Vec<ServedRow<'_>> {
-    let own = Action::ALL.into_iter().map(|action| ServedRow {
-        name: action.name().into(),
-        type_name: Some(action.type_name()),
-        node: action.owner(),
-    });
+pub(super) fn actions(census: &Census) -> Vec<Row<'_>> {
+    let own = Action::ALL.into_iter();
+    let own = own.map(|action| served(action.name(), action.type_name(), action.owner()));
     own.chain(of_clients(&census.actions)).collect()
 }
 
-fn of_clients(listed: &[ListedService]) -> impl Iterator<Item = ServedRow<'_>> {
-    listed.iter().map(|one| ServedRow {
-        name: (&*one.name).into(),
-        type_name: one.type_name.as_deref(),
-        node: Node::Gateway,
+fn of_clients(listed: &[ListedService]) -> impl Iterator<Item = Row<'_>> {
+    listed.iter().map(|one| {
+        let type_name = one.type_name.as_deref().unwrap_or_default();
+        served(&*one.name, type_name, Node::Gateway)
     })
 }
 
-/// The row of that name.
-pub(super) fn named<'a>(rows: Vec<ServedRow<'a>>, name: &str) -> Option<ServedRow<'a>> {
-    let name = names::absolute(name);
-    rows.into_iter().find(|row| row.name == name)
-}
-
-impl ServedRow<'_> {
-    /// Whether it is of that type.
-    pub(super) fn is_of(&self, type_name: &str) -> bool {
-        self.type_name.is_some_and(|own| match self.node {
-            Node::Gateway => names::same_type(own, type_name),
-            _ => same_service_type(own, type_name),
-        })
+fn served<'a>(name: impl Into<Cow<'a, str>>, type_name: &'a str, node: Node) -> Row<'a> {
+    Row {
+        name: name.into(),
+        type_name,
+        publishers: vec![node],
+        subscribers: vec![],
     }
-}
-
-/// The names of nodes, each once.
-pub(super) fn node_names<'a>(nodes: impl IntoIterator<Item = &'a Node>) -> BTreeSet<String> {
-    nodes.into_iter().map(|node| node_name(*node)).collect()
-}
-
-/// The topics and services of a node. All lists are empty if there is no such node.
-pub(super) fn node_details(name: &str, census: &Census) -> Value {
-    let name = names::relative(name);
-    let node = Node::ALL.into_iter().find(|node| node.name() == name);
-    let (topics, services) = (topics(census), services(census));
-    let node = node.as_slice();
-    let of = |nodes: &[Node]| node.iter().any(|node| nodes.contains(node));
-    let publishing = topics.iter().filter(|row| of(&row.publishers));
-    let subscribing = topics.iter().filter(|row| of(&row.subscribers));
-    let services = services.iter().filter(|row| of(&[row.node]));
-    json!({
-        "subscribing": subscribing.map(|row| row.name).collect::<BTreeSet<_>>(),
-        "publishing": publishing.map(|row| row.name).collect::<BTreeSet<_>>(),
-        "services": services.map(|row| &row.name).collect::<Vec<_>>(),
-    })
 }
 
 /// A node's name in the answers.
@@ -211,8 +163,8 @@ fn service_names(service: Service) -> Vec<String> {
     }
 }
 
-/// The same type. Older clients use `rosapi` for `rosapi_msgs`.
-pub(super) fn same_service_type(own: &str, name: &str) -> bool {
+/// Whether the names are those of one type. Older clients use `rosapi` for `rosapi_msgs`.
+pub(super) fn are_same_type(own: &str, name: &str) -> bool {
     let older = own
         .strip_prefix("rosapi_msgs/")
         .map(|rest| format!("rosapi/{rest}"));

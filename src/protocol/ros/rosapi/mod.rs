@@ -8,15 +8,13 @@
 mod graph;
 mod typedef;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
 pub use self::graph::{Census, ListedService, ListedTopic, MAX_LISTED};
-use self::graph::{
-    ServedRow, actions, named, node_details, node_name, node_names, services, topics,
-};
-pub use self::typedef::{TypeDef, asked_type};
+use self::graph::{Row, actions, are_same_type, node_name, services, topics};
+pub use self::typedef::asked_type;
 use self::typedef::{details, interfaces};
 use crate::protocol::catalog::{Node, Rosapi, Service, types};
 use crate::protocol::names;
@@ -27,77 +25,66 @@ const ROS_VERSION: u8 = 2;
 /// distribution.
 pub(crate) const DISTRO: &str = "jazzy";
 
-/// Why a call has no answer.
+/// The catalog has no type of the name in this field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum AnswerError {
-    /// The catalog has no type of that name.
-    #[error("{field} must name a type that this runtime knows")]
-    UnknownType {
-        /// The field that named it.
-        field: &'static str,
-    },
-    /// The call is for the arm.
-    #[error("the arm was not asked")]
-    OfTheArm,
-}
+#[error("{0} must name a type that this runtime knows")]
+pub struct UnknownType(pub &'static str);
 
 /// The `values` for a call about `asked`, the name in its request; `asked` is empty if the request has no name.
 ///
 /// # Errors
-/// If the type is unknown, or if the call is for the arm.
-pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, AnswerError> {
-    let fields = Service::Rosapi(question).fields();
-    let unknown = || AnswerError::UnknownType {
-        field: fields.first().map_or("", |field| field.name),
-    };
-    let type_of = |rows| {
-        let row = named(rows, asked);
-        row.and_then(|row| row.type_name)
-            .unwrap_or_default()
-            .to_owned()
-    };
-    let listed = |rows: Vec<ServedRow<'_>>| -> Vec<String> {
-        rows.into_iter().map(|row| row.name.into_owned()).collect()
-    };
-    let of_type = || -> Vec<ServedRow<'_>> {
-        let rows = services(census).into_iter();
-        rows.filter(|row| row.is_of(asked)).collect()
-    };
-    Ok(match question {
+/// If the type is unknown.
+pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, UnknownType> {
+    let service = Service::Rosapi(question);
+    let rows = match question {
         Rosapi::Topics
         | Rosapi::TopicsAndRawTypes
         | Rosapi::TopicsForType
         | Rosapi::TopicType
         | Rosapi::Publishers
-        | Rosapi::Subscribers => about_topics(question, asked, census),
-        Rosapi::Services => json!({"services": listed(services(census))}),
-        Rosapi::ServicesForType => json!({"services": listed(of_type())}),
-        Rosapi::ServiceType => {
-            json!({"type": type_of(services(census))})
+        | Rosapi::Subscribers => topics(census),
+        Rosapi::ActionServers | Rosapi::ActionType => actions(census),
+        _ => services(census),
+    };
+    let name = names::absolute(asked);
+    let found = rows.iter().find(|row| row.name == name);
+    let all = || rows.iter().map(|row| &*row.name).collect();
+    let types = || rows.iter().map(|row| row.type_name).collect();
+    let of_type = || {
+        let rows = rows.iter();
+        rows.filter(|row| are_same_type(row.type_name, asked))
+    };
+    // In the order of the catalog's fields.
+    let values: Vec<Value> = match question {
+        Rosapi::Topics => vec![all(), types()],
+        Rosapi::TopicsAndRawTypes => vec![all(), types(), definitions(&rows)],
+        Rosapi::Services | Rosapi::ActionServers => vec![all()],
+        Rosapi::TopicsForType | Rosapi::ServicesForType => {
+            vec![of_type().map(|row| &*row.name).collect()]
         }
+        Rosapi::TopicType | Rosapi::ServiceType | Rosapi::ActionType => {
+            vec![found.map_or("", |row| row.type_name).into()]
+        }
+        Rosapi::Publishers => vec![node_names(found.iter().flat_map(|row| &row.publishers))],
+        Rosapi::Subscribers => vec![node_names(found.iter().flat_map(|row| &row.subscribers))],
+        Rosapi::ServiceProviders => vec![node_names(of_type().flat_map(|row| &row.publishers))],
         Rosapi::ServiceNode => {
-            let node = named(services(census), asked).map(|row| node_name(row.node));
-            json!({"node": node.unwrap_or_default()})
+            let node = found.and_then(|row| row.publishers.first());
+            vec![node.copied().map(node_name).unwrap_or_default().into()]
         }
-        Rosapi::ServiceProviders => {
-            json!({"providers": node_names(of_type().iter().map(|row| &row.node))})
-        }
-        Rosapi::Nodes => json!({"nodes": Node::ALL.map(node_name)}),
-        Rosapi::NodeDetails => node_details(asked, census),
+        Rosapi::Nodes => vec![Node::ALL.map(node_name).into_iter().collect()],
+        Rosapi::NodeDetails => node_details(asked, &topics(census), &rows),
         Rosapi::MessageDetails
         | Rosapi::ServiceRequestDetails
         | Rosapi::ServiceResponseDetails
         | Rosapi::ActionGoalDetails
         | Rosapi::ActionResultDetails
         | Rosapi::ActionFeedbackDetails => {
-            json!({"typedefs": details(question, asked).ok_or_else(unknown)?})
+            let field = service.fields().first().map_or("", |field| field.name);
+            vec![details(question, asked).ok_or(UnknownType(field))?]
         }
-        Rosapi::ActionServers => json!({"action_servers": listed(actions(census))}),
-        Rosapi::ActionType => {
-            json!({"type": type_of(actions(census))})
-        }
-        Rosapi::Interfaces => json!({"interfaces": interfaces()}),
-        Rosapi::GetRosVersion => json!({"version": ROS_VERSION, "distro": DISTRO}),
+        Rosapi::Interfaces => vec![interfaces().into_iter().collect()],
+        Rosapi::GetRosVersion => vec![ROS_VERSION.into(), DISTRO.into()],
         Rosapi::GetParam
         | Rosapi::SetParam
         | Rosapi::HasParam
@@ -105,40 +92,41 @@ pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, A
         | Rosapi::GetParamNames
         | Rosapi::GetTime => {
             debug_assert!(false, "{question:?} is a question to the arm");
-            return Err(AnswerError::OfTheArm);
+            vec![]
         }
-    })
+    };
+    let names = service.response_fields().iter();
+    let names = names.map(|field| field.name.to_owned());
+    Ok(Value::Object(names.zip(values).collect()))
 }
 
-/// The `values` for a question about topics.
-fn about_topics(question: Rosapi, asked: &str, census: &Census) -> Value {
-    let rows = topics(census);
-    let absolute = names::absolute(asked);
-    let topic = rows.iter().find(|row| row.name == absolute);
-    let (names, types): (Vec<_>, Vec<_>) = rows.iter().map(|row| (row.name, row.type_name)).unzip();
-    match question {
-        Rosapi::TopicsForType => {
-            let of_type = rows.iter();
-            let of_type = of_type.filter(|row| names::same_type(row.type_name, asked));
-            json!({"topics": of_type.map(|row| row.name).collect::<Vec<_>>()})
-        }
-        Rosapi::TopicType => json!({"type": topic.map_or("", |row| row.type_name)}),
-        Rosapi::Publishers => {
-            json!({"publishers": node_names(topic.iter().flat_map(|row| &row.publishers))})
-        }
-        Rosapi::Subscribers => {
-            json!({"subscribers": node_names(topic.iter().flat_map(|row| &row.subscribers))})
-        }
-        Rosapi::TopicsAndRawTypes => {
-            // There are few types, but thousands of topics with them.
-            let mut known = BTreeMap::new();
-            for name in &types {
-                let text = known.entry(*name);
-                text.or_insert_with(|| types::full_text(name).unwrap_or_default());
-            }
-            let texts: Vec<_> = types.iter().filter_map(|name| known.get(name)).collect();
-            json!({"topics": names, "types": types, "typedefs_full_text": texts})
-        }
-        _ => json!({"topics": names, "types": types}),
-    }
+/// The topics and services of a node. All lists are empty if there is no such node.
+fn node_details(name: &str, topics: &[Row<'_>], services: &[Row<'_>]) -> Vec<Value> {
+    let name = names::relative(name);
+    let is_meant = |nodes: &[Node]| nodes.iter().any(|node| node.name() == name);
+    let subscribing = topics.iter().filter(|row| is_meant(&row.subscribers));
+    let publishing = topics.iter().filter(|row| is_meant(&row.publishers));
+    let services = services.iter().filter(|row| is_meant(&row.publishers));
+    vec![
+        json!(subscribing.map(|row| &row.name).collect::<BTreeSet<_>>()),
+        json!(publishing.map(|row| &row.name).collect::<BTreeSet<_>>()),
+        services.map(|row| &*row.name).collect(),
+    ]
+}
+
+/// The names of nodes, each once.
+fn node_names<'a>(nodes: impl IntoIterator<Item = &'a Node>) -> Value {
+    let names: BTreeSet<String> = nodes.into_iter().map(|node| node_name(*node)).collect();
+    json!(names)
+}
+
+/// The text that defines each row's type. There are few types, but thousands of topics with them.
+fn definitions(rows: &[Row<'_>]) -> Value {
+    let mut known = BTreeMap::new();
+    let text = |row: &Row<'_>| {
+        let text = known.entry(row.type_name.to_owned());
+        let text = text.or_insert_with_key(|name| types::full_text(name).unwrap_or_default());
+        text.clone()
+    };
+    rows.iter().map(text).collect()
 }

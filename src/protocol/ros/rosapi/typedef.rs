@@ -4,37 +4,17 @@
 
 use std::collections::BTreeSet;
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
-use super::graph::{own_services, same_service_type};
+use super::graph::{are_same_type, own_services};
 use crate::protocol::catalog::types::{self, Count, Type};
 use crate::protocol::catalog::{Action, Field, Rosapi, Service, message};
 use crate::protocol::names;
 
-/// A type in the format of rosapi, field by field.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct TypeDef {
-    /// Its name, without the middle part.
-    #[serde(rename = "type")]
-    pub name: String,
-    /// Names of the fields.
-    pub fieldnames: Vec<&'static str>,
-    /// Their types, without brackets.
-    pub fieldtypes: Vec<String>,
-    /// -1 for one value, 0 for any number, or the number of entries.
-    pub fieldarraylen: Vec<i32>,
-    /// An example value of each.
-    pub examples: Vec<&'static str>,
-    /// Names of the constants.
-    pub constnames: Vec<&'static str>,
-    /// Their values.
-    pub constvalues: Vec<&'static str>,
-}
-
 /// The type whose fields the question asks for: a message type, or a part of a service's or an action's type.
 #[must_use]
 pub fn asked_type(question: Rosapi, name: &str) -> Option<Type> {
-    let service = || own_services().find(|one| same_service_type(one.type_name(), name));
+    let service = || own_services().find(|one| are_same_type(one.type_name(), name));
     let action = || {
         let mut all = Action::ALL.into_iter();
         let action = all.find(|action| names::same_type(action.type_name(), name));
@@ -54,19 +34,16 @@ pub fn asked_type(question: Rosapi, name: &str) -> Option<Type> {
 }
 
 /// That type and all types in it, field by field; `None` if it is unknown.
-pub(super) fn details(question: Rosapi, name: &str) -> Option<Vec<TypeDef>> {
+pub(super) fn details(question: Rosapi, name: &str) -> Option<Value> {
+    let mut ending = match question {
+        Rosapi::ServiceRequestDetails => "_Request",
+        Rosapi::ServiceResponseDetails => "_Response",
+        _ => "",
+    };
     let all = types::with_parts(asked_type(question, name)?).into_iter();
-    let mut all: Vec<TypeDef> = all
-        .map(|one| TypeDef::new(names::short_type(one.name), &one))
-        .collect();
-    if let Some(first) = all.first_mut() {
-        first.name += match question {
-            Rosapi::ServiceRequestDetails => "_Request",
-            Rosapi::ServiceResponseDetails => "_Response",
-            _ => "",
-        };
-    }
-    Some(all)
+    // Only the first is a request or a response.
+    let all = all.map(|one| typedef(&one, std::mem::take(&mut ending)));
+    Some(all.collect())
 }
 
 /// Every type that the runtime knows, each once.
@@ -77,30 +54,27 @@ pub(super) fn interfaces() -> BTreeSet<&'static str> {
     messages.chain(services).chain(actions).collect()
 }
 
-impl TypeDef {
-    fn new(name: String, one: &Type) -> Self {
-        let fields = one.fields;
-        let elements = || fields.iter().map(Field::element);
-        Self {
-            name,
-            fieldnames: fields.iter().map(|field| field.name).collect(),
-            fieldtypes: elements()
-                .map(|(kind, _)| names::short_type(kind))
-                .collect(),
-            fieldarraylen: elements()
-                .map(|(_, count)| match count {
-                    Count::One => -1,
-                    Count::Any => 0,
-                    Count::Exactly(count) => i32::try_from(count).unwrap_or(i32::MAX),
-                })
-                .collect(),
-            examples: elements()
-                .map(|(kind, count)| example(kind, count))
-                .collect(),
-            constnames: one.constants.iter().map(|one| one.name).collect(),
-            constvalues: one.constants.iter().map(|one| one.value).collect(),
-        }
-    }
+/// A `rosapi_msgs/msg/TypeDef`. Its name has no middle part. The length of an array is -1 for one value, 0 for any
+/// number, or the number of entries.
+fn typedef(one: &Type, ending: &str) -> Value {
+    let elements: Vec<_> = one.fields.iter().map(Field::element).collect();
+    let length = |count| match count {
+        Count::One => -1,
+        Count::Any => 0,
+        Count::Exactly(count) => i32::try_from(count).unwrap_or(i32::MAX),
+    };
+    let kinds = elements.iter().map(|(kind, _)| names::short_type(kind));
+    let lengths = elements.iter().map(|(_, count)| length(*count));
+    let examples = elements.iter().map(|(kind, count)| example(kind, *count));
+    json!({
+        "type": names::short_type(one.name) + ending,
+        "fieldnames": one.fields.iter().map(|field| field.name).collect::<Value>(),
+        "fieldtypes": kinds.collect::<Value>(),
+        "fieldarraylen": lengths.collect::<Value>(),
+        "examples": examples.collect::<Value>(),
+        "constnames": one.constants.iter().map(|one| one.name).collect::<Value>(),
+        "constvalues": one.constants.iter().map(|one| one.value).collect::<Value>(),
+    })
 }
 
 /// A value of that type, as JSON text.

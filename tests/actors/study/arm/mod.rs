@@ -45,7 +45,9 @@ impl Consulting {
                 timestep: Some(limit.get()),
             })
         });
-        stage.arm.send(SetLimitPredictor(study)).await.unwrap();
+        let study = Some(study);
+        let owners = Vec::new();
+        stage.arm.send(Connect { study, owners }).await.unwrap();
         Self {
             client: stage.connect(),
             stage,
