@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build install run page test conformance test-slow check-study test-page test-browser test-clients simulate fuzz attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
+.PHONY: help build install run page test conformance check-study test-page test-browser test-clients simulate fuzz attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -49,10 +49,6 @@ test: ## Run every test that needs only Rust, except slow ones
 conformance: ## Test any server of the protocol against the specification's rules: ADDR=127.0.0.1:9095; ARGS="--category pid" or "--rule reset"
 	@echo "make conformance: one line per rule, about 40 s; exit status 0 if every rule holds"
 	@$(CARGO) run --quiet --locked -p pendularm-conformance -- "$(or $(ADDR),127.0.0.1:9095)" $(ARGS)
-
-test-slow: ## Run the tests of faults that take a minute or two; ARGS=faults_slow::fifty selects some; needs Debian's libfaketime
-	@echo "make test-slow: a gigabyte of waiting answers, and jumps of the wall clock"
-	$(CARGO) test --locked --test wire -- $(or $(ARGS),faults_slow::) --ignored --nocapture --test-threads 1
 
 check-study: ## Check the study on COUNT=10000 random arms, gains, poses and setpoints; FROM=n begins at case n; PROFILE=dev uses the tests' build
 	@echo "make check-study: an optimised build, then some minutes per 10000 cases"

@@ -2,6 +2,7 @@
 //! its steps.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use crate::stage::{Stage, asked, ms, publisher};
 use crate::system::in_virtual_time;
@@ -36,25 +37,42 @@ pub fn enable(enabled: bool) -> Enable {
     }
 }
 
-/// An arm that stays at rest at every timestep: gravity and gains are zero.
-async fn weightless() -> Stage<2> {
-    Stage::with_a_floating_arm().await.0
-}
-
 /// With a timestep that is too short for every machine, each wake-up works for its 5 ms. Alone, the 12 ticks of 0.2 s
 /// would make 0.06 s. With a wake-up after every pause of a millisecond (two, by the timer's grain) it is at least 0.5
-/// s.
+/// s. Calls share the wake-ups: alone, these would take 1.6 s.
 #[test]
-fn steps_left_by_a_wake_up_are_taken_before_the_next_tick() {
+fn an_arm_that_can_not_follow_steps_between_the_ticks_and_warns_and_answers() {
     in_virtual_time(async {
-        let stage = weightless().await;
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         asked(&stage.arm, of_timestep(1e-12)).await;
-        work_clock::count(ms(1));
+        work_clock::count(Duration::from_micros(100));
         let began = work_clock::now();
         sleep(ms(200)).await;
         let worked = work_clock::now() - began;
         let ticks_alone = 12 * WAKE_UP_BUDGET;
         assert!(worked > 4 * ticks_alone, "{worked:?}");
+        let began = work_clock::now();
+        for _ in 0..320 {
+            asked(&stage.arm, Pause::default()).await;
+        }
+        let worked = work_clock::now() - began;
+        assert!(worked < 40 * WAKE_UP_BUDGET, "{worked:?}");
+        client.subscribe("/diagnostics").await;
+        for (timestep, level) in [(1e-12, 1), (1e-300, 1), (0.001, 0)] {
+            asked(&stage.arm, of_timestep(timestep)).await;
+            sleep(ms(2000)).await;
+            client.settle().await;
+            let last = client.messages("/diagnostics").pop().unwrap();
+            let arm = &last["status"][0];
+            assert_eq!(
+                (&arm["level"], &arm["message"]),
+                (&level.into(), &"running".into()),
+                "{arm}"
+            );
+            let factor = arm["values"][2]["value"].as_str().unwrap();
+            let factor: f64 = factor.parse().unwrap();
+            assert_eq!(factor < 0.01, level == 1, "{arm}");
+        }
     });
 }
 

@@ -121,26 +121,3 @@ fn steps_of_a_client_equal_the_offline_steppers_for_all_settings_between_them() 
         }
     });
 }
-
-/// Steps are taken in slices. Later requests of the same client still wait.
-#[test]
-fn requests_after_a_clients_steps_take_effect_after_them() {
-    in_virtual_time(async {
-        let (_stage, mut client, mut offline) = paused().await;
-        for length in [1.1, 1.2, 1.3, 1.4] {
-            for (service, args) in [
-                ("/arm_sim/step", json!({"steps": 5000})),
-                ("/arm_sim/set_params", json!({"lengths": [length, 1]})),
-            ] {
-                let call = json!({"op": "call_service", "service": service, "args": args});
-                client.send(&call).await;
-            }
-            offline.advance(5000);
-            offline.set_arm(Arm::new([length, 1.0], [1.0; 2], 9.81).unwrap());
-        }
-        for _ in 0..8 {
-            assert_eq!(client.receive().await["result"], true);
-        }
-        step(&mut client, &mut offline, 1, None).await;
-    });
-}

@@ -7,42 +7,38 @@ use std::sync::atomic::Ordering;
 
 use crate::ik_action::elsewhere;
 use crate::stage::{
-    Client, asked, connect, ms, pass, pose_at, publisher, silent_arm, silent_tracker, stand_in,
+    Client, asked, connect, ms, pass, pose_at, silent_arm, silent_tracker, stand_in,
 };
 use crate::system::{counting_wake_ups, in_virtual_time};
 use actix::prelude::*;
 use pendularm::actors::arm::ik_action::{
-    CancelRejected, CancelRequest, GoalRejected, GoalReport, IkAction, SendGoal,
+    CancelRejected, CancelRequest, GoalRejected, GoalReport, SendGoal,
 };
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, TrialRequest};
 use pendularm::actors::arm::sim::{ArmPose, GoalProgress, Pose};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::node::Barrier;
-use pendularm::actors::node::{Call, Interest};
+use pendularm::actors::node::Call;
 use pendularm::actors::nodes::start_goal_nodes;
 use pendularm::math::goal::Outcome;
 use pendularm::math::kinematics::{Target, Unreachable};
 use pendularm::math::trial::Changes;
-use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::op::fields::Rejections;
 use pendularm::services::goals::AcceptedGoal;
 use serde_json::Value;
-use tokio::sync::mpsc::unbounded_channel;
 use tokio::time::Instant;
 
 const STATUS: &str = "/ik_trial/status";
 
 fn start(duration: f64, epsilon: f64, success_hold: f64) -> TrialRequest {
-    start_with(Changes {
-        duration: Some(duration),
-        epsilon: Some(epsilon),
-        success_hold: Some(success_hold),
-    })
-}
-
-fn start_with(changes: Changes) -> TrialRequest {
-    let rejected = Rejections::default();
-    TrialRequest::Start { changes, rejected }
+    TrialRequest::Start {
+        changes: Changes {
+            duration: Some(duration),
+            epsilon: Some(epsilon),
+            success_hold: Some(success_hold),
+        },
+        rejected: Rejections::default(),
+    }
 }
 
 /// Starts a trial, which must succeed.
@@ -177,35 +173,6 @@ fn after_a_refusal_another_target_is_sampled_for_the_lengths_of_that_moment() {
         assert!(sent[1].position.length() > 2e-3, "the old lengths");
         for target in &sent[2..] {
             assert!(target.position.length() <= 2e-3, "the new ones");
-        }
-    });
-}
-
-/// The node's own messages, before the registry could drop them.
-#[test]
-fn no_status_is_encoded_without_a_subscriber() {
-    in_virtual_time(async {
-        let (sender, mut published) = unbounded_channel();
-        let publish = publisher(sender);
-        let action = IkAction::<2>::new(silent_tracker(), publish.clone()).start();
-        let goals = GoalClient {
-            send: action.clone().recipient(),
-            cancel: action.clone().recipient(),
-            barrier: action.recipient(),
-        };
-        let rng = fastrand::Rng::with_seed(1);
-        let trial = IkTrial::new(silent_arm(), goals, publish, rng).start();
-        for (wanted, expected) in [(false, 0), (true, 2), (false, 0)] {
-            let topic = Topic::TrialStatus;
-            trial.send(Interest { topic, wanted }).await.unwrap();
-            begin(&trial, start_with(Changes::default())).await;
-            // The accepted goal, and one message of the 10 Hz.
-            pass(ms(150)).await;
-            let mut statuses = 0;
-            while let Ok(topic) = published.try_recv() {
-                statuses += usize::from(topic == Topic::TrialStatus);
-            }
-            assert_eq!(statuses, expected);
         }
     });
 }

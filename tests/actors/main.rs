@@ -18,7 +18,6 @@ mod exchanges;
 mod folder;
 mod ik_action;
 mod ik_trial;
-mod integration;
 mod kernel;
 mod listener;
 mod log_repeats;
@@ -32,7 +31,6 @@ mod refusals;
 mod registry;
 #[cfg(feature = "record")]
 mod replay;
-mod rosapi;
 #[path = "../support/stage.rs"]
 mod stage;
 mod study;

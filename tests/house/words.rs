@@ -117,29 +117,6 @@ fn is_long(sentence: &str) -> bool {
 }
 
 #[test]
-fn a_long_sentence_is_found_and_no_code() {
-    let long = "word ".repeat(31);
-    for (text, count) in [
-        (format!("// {long}."), 1),
-        (format!("//! Short.\n//! {long}.\n"), 1),
-        (format!("// `{long}` is code."), 0),
-        (format!("// {0}.\n// A{0}.", "word ".repeat(20)), 0),
-        (
-            format!("//! ```text\n//! {long}\n//! ```\n//! | {long} |"),
-            0,
-        ),
-        (format!("let text = \"{long}\";"), 0),
-    ] {
-        let found = paragraphs(&text, "rs");
-        let sentences = found
-            .iter()
-            .flat_map(|(_, one)| sentences(&without_code(one)));
-        let long = sentences.filter(|one| is_long(one)).count();
-        assert_eq!(long, count, "{text}");
-    }
-}
-
-#[test]
 fn few_sentences_are_long() {
     let (mut count, mut found) = (0, Vec::new());
     // The kept report is made by the program, whose sentences are counted in its source.
@@ -163,5 +140,5 @@ fn few_sentences_are_long() {
         found.len(),
         found.join("\n")
     );
-    assert!(found.len() <= count / ONE_IN, "{told}");
+    assert!(count > 5000 && found.len() <= count / ONE_IN, "{told}");
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use actix::dev::ToEnvelope;
 use actix::prelude::*;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::node::{Ask, Asker, Call, Done, Reply, Unserved, ask, guard};
+use pendularm::actors::node::{Ask, Asker, Call, Done, Reply, Unserved, guard};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::sync::oneshot;
 use tokio::time::timeout;
@@ -103,26 +103,10 @@ impl<T: Actor<Context = Context<T>>> PoolBench<T> {
         )
     }
 
-    /// Calls as another node does.
-    pub async fn ask<A: Ask>(&self, question: A) -> A::Answer
-    where
-        T: Handler<Call<A>>,
-        Context<T>: ToEnvelope<T, Call<A>>,
-    {
-        let answer = ask(&self.node.clone().recipient(), question);
-        let answer = timeout(PATIENCE, answer).await;
-        answer.expect("an answer in time").expect("an answer")
-    }
-
     /// The connection that is answered next.
     pub async fn next(&mut self) -> u64 {
         let next = timeout(PATIENCE, self.order.recv()).await;
         next.expect("an answer in time").expect("the bench lives")
-    }
-
-    /// Whether no client has been answered since the last query.
-    pub fn is_silent(&mut self) -> bool {
-        self.order.try_recv().is_err()
     }
 }
 

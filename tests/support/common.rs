@@ -191,14 +191,6 @@ impl Runtime {
         Client::to(self.address)
     }
 
-    /// The most memory that the program has had resident, in bytes.
-    pub fn peak_memory(&self) -> usize {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap();
-        let line = status.lines().find(|line| line.starts_with("VmHWM"));
-        let kilobytes = line.and_then(|line| line.split_whitespace().nth(1));
-        kilobytes.unwrap().parse::<usize>().unwrap() * 1024
-    }
-
     pub fn pid(&self) -> u32 {
         self.child.id()
     }

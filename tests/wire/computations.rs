@@ -2,9 +2,8 @@
 
 use std::time::Duration;
 
-use crate::arm::{in_one_of_three_tries, stamp};
 use crate::common::{Client, PATIENCE, Runtime};
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// A call with seconds of work and a small answer: a sum of 2001 terms (4001 nodes), 4 times in each of 100,000 steps.
 /// A test that sends it does not wait for its end.
@@ -15,9 +14,10 @@ fn send_heavy(client: &mut Client) {
         .send(&json!({"op": "call_service", "service": "/arm_sim/integration_step", "args": args}));
 }
 
+/// A correct runtime may fail a try on a busy machine, and a wrong one never passes.
 #[test]
 fn the_arm_and_its_messages_continue_during_a_computation() {
-    in_one_of_three_tries("a third of the time and a sixth of the messages", || {
+    let attempt = || {
         let runtime = Runtime::start();
         let mut busy: Vec<Client> = (0..3).map(|_| runtime.connect()).collect();
         for client in &mut busy {
@@ -27,13 +27,15 @@ fn the_arm_and_its_messages_continue_during_a_computation() {
         let mut watcher = runtime.connect();
         watcher.subscribe("/joint_states");
         let seen = watcher.receive_for(Duration::from_secs(2));
-        let stamps: Vec<f64> = seen.iter().map(|frame| stamp(&frame["msg"])).collect();
-        // 120 and 2 s on an idle machine.
-        let simulated = stamps.last().unwrap_or(&0.0) - stamps.first().unwrap_or(&0.0);
-        (stamps.len() > 20 && simulated > 0.7)
-            .then_some(())
-            .ok_or(format!("{} and {simulated} s in 2 s", stamps.len()))
-    });
+        let time = |frame: Option<&Value>| {
+            let stamp = &frame.expect("a message")["msg"]["header"]["stamp"];
+            stamp["sec"].as_f64().unwrap() + stamp["nanosec"].as_f64().unwrap() / 1e9
+        };
+        // 120 messages and 2 s on an idle machine.
+        (seen.len(), time(seen.last()) - time(seen.first()))
+    };
+    let passes = |(messages, simulated)| messages > 20 && simulated > 0.7;
+    assert!((0..3).any(|_| passes(attempt())), "in 2 s");
 }
 
 /// A hundred thousand samples of a million steps: answered in one frame, while others are served.

@@ -7,27 +7,6 @@ use std::process::Stdio;
 use crate::common::{self, Client, Runtime, program, signal};
 use serde_json::json;
 
-fn links(client: &mut Client) -> usize {
-    let values = client.ask("/arm_sim/set_params", json!({}));
-    values["lengths"].as_array().unwrap().len()
-}
-
-#[test]
-fn the_number_of_links_comes_from_the_environment_and_two_is_the_default() {
-    assert_eq!(links(&mut Runtime::start().connect()), 2);
-    for (arguments, value, expected) in [
-        (&[][..], "", 2),
-        (&[], "2", 2),
-        (&[], "3", 3),
-        (&["--links", "3"], "2", 3),
-    ] {
-        let mut command = program();
-        command.env("ARM_SIM_LINKS", value);
-        let runtime = Runtime::spawn(command, "127.0.0.1:0", arguments);
-        assert_eq!(links(&mut runtime.connect()), expected, "{value:?}");
-    }
-}
-
 #[test]
 fn the_version_goes_to_standard_output_with_status_0() {
     let mut version = program();

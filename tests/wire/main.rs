@@ -17,19 +17,12 @@
               helpers are handed values that were made for them, and binaries that share them need not use every part"
 )]
 
-#[path = "../support/arm.rs"]
-mod arm;
-mod backpressure;
-mod clock_diagnostics;
 #[cfg(feature = "cli")]
 mod command;
 #[path = "../support/common.rs"]
 mod common;
 mod computations;
-#[path = "../support/diagnostics.rs"]
-mod diagnostics;
 mod faults_files;
-mod faults_slow;
 mod faults_threads;
 #[path = "../support/folder.rs"]
 mod folder;
@@ -38,7 +31,6 @@ mod http;
 mod launch;
 mod mishaps;
 mod options;
-mod order;
 mod places;
 #[cfg(target_os = "linux")]
 mod present;
@@ -46,10 +38,6 @@ mod priority;
 mod readme;
 #[cfg(feature = "record")]
 mod record;
-#[cfg(feature = "record")]
-mod record_words;
 mod shutdown;
-mod time;
-mod token;
 #[path = "../support/web_client.rs"]
 mod web_client;

@@ -8,7 +8,7 @@ use std::process::Stdio;
 
 use crate::common::{Client, Logged, Runtime, program, shell, signal};
 use crate::folder::Folder;
-use serde_json::{Value, json};
+use serde_json::json;
 
 #[cfg(all(feature = "record", target_os = "linux"))]
 #[test]
@@ -138,65 +138,48 @@ fn clients_are_served_even_if_standard_output_fails() {
 }
 
 /// The number of events in lines: one each, or the number in the line.
-fn events<'a>(lines: impl Iterator<Item = &'a str>) -> u64 {
-    lines
-        .map(|line| match line.split_once("(first of ") {
-            Some((_, rest)) => rest.split(' ').next().unwrap().parse().unwrap(),
-            None => 1,
-        })
-        .sum()
+fn events(lines: &[String]) -> usize {
+    let count = |line: &String| match line.split_once("(first of ") {
+        Some((_, rest)) => rest.split(' ').next().unwrap().parse().unwrap(),
+        None => 1,
+    };
+    lines.iter().map(count).sum()
 }
 
+/// `tests/actors/log_repeats.rs` has the times.
 #[test]
-fn a_repeated_warning_is_logged_once_a_second_with_a_count() {
-    const TIMES: u64 = 3000;
+fn a_repeated_warning_is_logged_and_published_once_a_second_with_a_count() {
+    const TIMES: usize = 100;
     let runtime = Logged::start(program(), Stdio::null());
-    let mut listener = Client::to(runtime.address);
+    let (mut client, mut listener) = (Client::to(runtime.address), Client::to(runtime.address));
     listener.subscribe("/rosout");
-    // Read at once, because messages that wait for a second are dropped.
-    let published = std::thread::spawn(move || {
-        let mut published = Vec::new();
-        while events(published.iter().map(String::as_str)) < TIMES {
-            let message = listener.message("/rosout");
-            let from = (&message["level"], &message["name"]);
-            assert_eq!(from, (&json!(30), &json!("arm_sim")), "{message}");
-            assert!(
-                message["file"].as_str().unwrap().ends_with(".rs"),
-                "{message}"
-            );
-            published.push(message["msg"].as_str().unwrap().to_owned());
-        }
-        published
-    });
-    let mut client = Client::to(runtime.address);
     client.ask("/arm_sim/pause", json!({"data": true}));
     client.ask("/arm_sim/set_params", json!({"gravity": 1e300}));
     client.ask("/arm_sim/set_integrator", json!({"timestep": 1e10}));
     let began = std::time::Instant::now();
-    let call = |service: &str, args: Value| {
-        format!(
-            "{}\n",
-            json!({"op": "call_service", "service": service, "args": args})
-        )
-    };
-    let round = call("/arm_sim/reset", json!({})) + &call("/arm_sim/step", json!({"steps": 1}));
-    for _ in 0..TIMES / 100 {
-        client.send_bytes(round.repeat(100).as_bytes());
-        for _ in 0..200 {
-            client.receive();
-        }
+    let step = json!({"op": "call_service", "service": "/arm_sim/step", "args": {"steps": 1}});
+    let reset = json!({"op": "call_service", "service": "/arm_sim/reset"});
+    client.send_bytes(format!("{reset}\n{step}\n").repeat(TIMES).as_bytes());
+    let mut published = Vec::new();
+    while events(&published) < TIMES {
+        let message = listener.message("/rosout");
+        assert_eq!(
+            (&message["level"], &message["name"]),
+            (&json!(30), &json!("arm_sim"))
+        );
+        let is_source = message["file"].as_str().unwrap().ends_with(".rs");
+        assert!(is_source, "{message}");
+        published.push(message["msg"].as_str().unwrap().to_owned());
     }
-    let seconds = began.elapsed().as_secs() + 2;
-    let published = published.join().unwrap();
-    assert_eq!(events(published.iter().map(String::as_str)), TIMES);
-    assert!(published.len() as u64 <= seconds, "{published:?}");
-    let log = runtime.end();
-    let lines = log.iter().filter(|line| line.contains("diverged"));
-    let lines: Vec<&str> = lines.map(String::as_str).collect();
-    assert!(
-        lines.iter().all(|line| line.contains(" WARN pendularm::")),
-        "{lines:?}"
-    );
-    assert!(lines.len() as u64 <= seconds, "{lines:?}");
-    assert_eq!(events(lines.into_iter()), TIMES);
+    let mut log = runtime.end();
+    let seconds = began.elapsed().as_secs() as usize + 2;
+    log.retain(|line| line.contains("diverged"));
+    let is_warning = |line: &String| line.contains(" WARN pendularm::");
+    assert!(log.iter().all(is_warning), "{log:?}");
+    for lines in [log, published] {
+        assert!(
+            lines.len() <= seconds && events(&lines) == TIMES,
+            "{lines:?}"
+        );
+    }
 }

@@ -5,7 +5,10 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use pendularm::record::{CALLS, INPUTS, RecordEnding, RecordedMessage, Recording, STATES, replay};
+use pendularm::record::{
+    CALLS, Content, INPUTS, McapWriter, RecordEnding, RecordEntry, RecordedMessage, Recording,
+    RunSettings, STATES, replay,
+};
 use serde_json::{Value, json};
 
 use crate::common::{PATIENCE, Runtime, signal};
@@ -30,15 +33,38 @@ fn holds_call(file: &Path, args: &str) -> bool {
 }
 
 /// The program with a command: its exit status and its output.
-pub(super) fn run(arguments: &[&str]) -> (Option<i32>, String) {
+fn run(arguments: &[&str]) -> (Option<i32>, String) {
     let mut program = Command::new(env!("CARGO_BIN_EXE_pendularm"));
     let output = program.args(arguments).output().unwrap();
     let said = [output.stdout, output.stderr].concat();
     (output.status.code(), String::from_utf8(said).unwrap())
 }
 
-pub(super) fn text(path: &Path) -> &str {
+fn text(path: &Path) -> &str {
     path.to_str().unwrap()
+}
+
+/// Each channel has the quality of service that rosbag2 plays it with, where policies are numbers.
+fn assert_qos(file: &Path) {
+    let summary = mcap::Summary::read(&fs::read(file).unwrap());
+    let summary = summary.unwrap().unwrap();
+    let mut records = summary.metadata_indexes.iter();
+    assert!(records.any(|one| one.name == "rosbag2"));
+    let infinite = "\n    sec: 9223372036\n    nsec: 854775807";
+    for channel in summary.channels.values() {
+        let topic = channel.topic.as_str();
+        let is_latched = topic.starts_with("/robot_description") || topic == "/tf_static";
+        let (depth, durability) = if is_latched { (1, 1) } else { (10, 2) };
+        let expected = format!(
+            "- history: 1\n  depth: {depth}\n  reliability: 1\n  durability: {durability}\n  deadline:{infinite}\n  \
+             lifespan:{infinite}\n  liveliness: 1\n  liveliness_lease_duration:{infinite}\n  \
+             avoid_ros_namespace_conventions: false"
+        );
+        assert_eq!(
+            channel.metadata["offered_qos_profiles"], expected,
+            "{topic}"
+        );
+    }
 }
 
 #[test]
@@ -61,6 +87,7 @@ fn a_run_is_recorded_whole_and_replayed() {
     for topic in [INPUTS, STATES, CALLS, "/joint_states", "/tf", "/clock"] {
         assert!(passages.iter().any(|one| one.topic == topic), "{topic}");
     }
+    assert_qos(&file);
     let verdict = replay(File::open(&file).unwrap()).unwrap();
     assert_eq!((verdict.links, verdict.difference), (3, None));
     assert!(verdict.inputs >= 3 && verdict.states >= 20);
@@ -68,70 +95,6 @@ fn a_run_is_recorded_whole_and_replayed() {
     let (status, said) = run(&["replay", text(&file)]);
     assert_eq!(status, Some(0), "{said}");
     assert!(said.ends_with("the same, bit for bit\n"), "{said}");
-}
-
-#[cfg(feature = "cli")]
-/// As rosbag2 reads it: with the metadata record of that name and no metadata in it, policies are numbers.
-#[test]
-fn each_channel_has_the_quality_of_service_that_rosbag2_plays_it_with() {
-    let folder = Folder::new("record-qos");
-    let file = folder.join("run.mcap");
-    let runtime = Runtime::with(&["--record", text(&file)]);
-    let mut client = runtime.connect();
-    client.ask("/arm_sim/pause", json!({"data": true}));
-    client.subscribe("/joint_states");
-    client.message("/joint_states");
-    runtime.stop();
-    let summary = mcap::Summary::read(&fs::read(&file).unwrap())
-        .unwrap()
-        .unwrap();
-    let latched = [
-        "/robot_description",
-        "/robot_description_semantic",
-        "/tf_static",
-    ];
-    let mut seen = 0;
-    for channel in summary.channels.values() {
-        let profiles = &channel.metadata["offered_qos_profiles"];
-        let documents = yaml_rust2::YamlLoader::load_from_str(profiles).unwrap();
-        let [profile] = documents[0].as_vec().unwrap().as_slice() else {
-            panic!("{profiles}");
-        };
-        let number = |name: &str| profile[name].as_i64().unwrap();
-        let is_latched = latched.contains(&channel.topic.as_str());
-        seen += usize::from(is_latched);
-        let (transient_local, volatile) = (1, 2);
-        let durability = if is_latched {
-            transient_local
-        } else {
-            volatile
-        };
-        assert_eq!(number("durability"), durability, "{}", channel.topic);
-        assert_eq!(
-            (
-                number("history"),
-                number("reliability"),
-                number("liveliness")
-            ),
-            (1, 1, 1)
-        );
-        assert!(number("depth") > 0);
-        for time in ["deadline", "lifespan", "liveliness_lease_duration"] {
-            assert_eq!(profile[time]["sec"].as_i64(), Some(9_223_372_036));
-            assert_eq!(profile[time]["nsec"].as_i64(), Some(854_775_807));
-        }
-        assert_eq!(
-            profile["avoid_ros_namespace_conventions"].as_bool(),
-            Some(false)
-        );
-    }
-    assert_eq!(seen, latched.len());
-    assert!(
-        summary
-            .metadata_indexes
-            .iter()
-            .any(|one| one.name == "rosbag2")
-    );
 }
 
 #[test]
@@ -160,49 +123,26 @@ fn a_killed_program_leaves_a_record_that_is_read_and_replayed() {
 }
 
 #[test]
-fn an_unusable_record_is_refused_with_the_files_name() {
+fn an_unusable_file_or_folder_is_refused_by_its_name() {
     let folder = Folder::new("record-refused");
-    let there = folder.join("there.mcap");
+    let (there, nowhere) = (folder.join("there.mcap"), folder.join("nowhere.mcap"));
     fs::write(&there, "precious").unwrap();
-    let (status, said) = run(&[
-        "--bind",
-        "127.0.0.1:0",
-        "--log",
-        "off",
-        "--record",
-        text(&there),
-    ]);
-    assert_eq!(status, Some(1));
-    let named = format!("cannot record: {}: ", there.display());
-    assert!(said.contains(&named), "{said}");
-    assert_eq!(fs::read_to_string(&there).unwrap(), "precious");
-
-    let (status, said) = run(&["replay", text(&there)]);
-    assert_eq!(status, Some(1));
-    assert!(said.contains("there.mcap: not a record: "), "{said}");
-    let (status, said) = run(&["replay", text(&folder.join("nowhere.mcap"))]);
-    assert_eq!(status, Some(1));
-    assert!(said.contains("nowhere.mcap: "), "{said}");
-    let (status, said) = run(&["replay", text(&folder)]);
-    assert_eq!(status, Some(1));
-    let cause = format!("{}: Is a directory", folder.display());
-    assert!(said.contains(&cause), "{said}");
-    let (status, _) = run(&["replay"]);
-    assert_eq!(status, Some(2));
-}
-
-#[test]
-fn a_folder_that_is_none_is_refused_at_the_start() {
-    let folder = Folder::new("record-no-folder");
-    let file = folder.join("file");
-    fs::write(&file, "").unwrap();
-    for none in [&folder.join("missing"), &file] {
-        let bind = ["--bind", "127.0.0.1:0", "--log", "off"];
-        let (status, said) = run(&[&bind[..], &["--record-dir", text(none)]].concat());
-        assert_eq!(status, Some(1));
-        let named = format!("cannot record: {}: ", none.display());
-        assert!(said.contains(&named), "{said}");
+    for (option, path, why) in [
+        ("--record", &there, "cannot record: "),
+        ("--record-dir", &there, "cannot record: "),
+        ("--record-dir", &nowhere, "cannot record: "),
+        ("replay", &there, ""),
+        ("replay", &nowhere, ""),
+        ("replay", &folder.to_path_buf(), ""),
+    ] {
+        let serve = ["--bind", "127.0.0.1:0", "--log", "off"];
+        let serve = if option == "replay" { &[] } else { &serve[..] };
+        let (status, said) = run(&[serve, &[option, text(path)]].concat());
+        assert_eq!(status, Some(1), "{said}");
+        let named = format!("pendularm: {why}{}: ", path.display());
+        assert!(said.starts_with(&named), "{said}");
     }
+    assert_eq!(fs::read_to_string(&there).unwrap(), "precious");
 }
 
 #[test]
@@ -246,33 +186,115 @@ fn clients_record_into_the_operators_folder_and_nowhere_else() {
 }
 
 #[test]
-fn without_a_folder_clients_neither_begin_nor_end_a_record() {
+fn the_operators_record_is_not_ended_by_a_client() {
     let folder = Folder::new("record-operators");
-    let file = folder.join("run.mcap");
-    let runtime = Runtime::with(&["--record", text(&file)]);
-    let mut client = runtime.connect();
-    for service in ["/recorder/start", "/recorder/stop"] {
-        let refused = client.call(service, json!({}));
+    let file = folder.join("operators.mcap");
+    let record = ["--record", text(&file)];
+    for (option, why) in [
+        (&[][..], "--record-dir"),
+        (
+            &["--record-dir", text(&folder)],
+            "operators.mcap was started by the operator with --record",
+        ),
+    ] {
+        let runtime = Runtime::with(&[&record, option].concat());
+        let mut client = runtime.connect();
+        let refused = client.call("/recorder/stop", json!({}));
         let status = refused["status"].as_str().unwrap();
-        assert!(status.contains("--record-dir"), "{status}");
+        assert!(status.contains(why), "{status}");
+        client.ask("/arm_sim/pause", json!({"data": true}));
+        runtime.stop();
+        assert_eq!(passages(&file).1, RecordEnding::Whole);
+        assert!(holds_call(&file, "{\"data\":true}"));
+        fs::remove_file(&file).unwrap();
     }
+}
+
+/// The first input of a new record of a run with one call: the whole simulation at its start.
+fn beginning(file: &Path) -> String {
+    let runtime = Runtime::with(&["--record", text(file)]);
+    runtime
+        .connect()
+        .ask("/arm_sim/pause", json!({"data": true}));
     runtime.stop();
-    assert_eq!(passages(&file).1, RecordEnding::Whole);
+    let (passages, _) = passages(file);
+    let begin = passages.iter().find(|one| one.topic == INPUTS).unwrap();
+    let begin = begin.msg.as_ref().unwrap()["input"].as_str();
+    begin.unwrap().to_owned()
+}
+
+const fn input(note: String) -> Content {
+    Content::Input { step: 0, note }
+}
+
+/// Writes a record of its own over `file`.
+fn write(file: &Path, contents: impl IntoIterator<Item = Content>) {
+    let settings = RunSettings { links: 2, seed: 0 };
+    let mut writer = McapWriter::new(File::create(file).unwrap(), &settings).unwrap();
+    for content in contents {
+        let log_time = 0;
+        writer.write(&RecordEntry { log_time, content }).unwrap();
+    }
+    writer.finish().unwrap();
 }
 
 #[test]
-fn the_operators_record_is_not_ended_by_a_client() {
-    let folder = Folder::new("record-operators-and-clients");
-    let file = folder.join("operators.mcap");
-    let runtime = Runtime::with(&["--record", text(&file), "--record-dir", text(&folder)]);
-    let mut client = runtime.connect();
-    let refused = client.call("/recorder/stop", json!({}));
-    assert_eq!(
-        refused["status"],
-        "operators.mcap was started by the operator with --record, and ends with the program"
+fn a_record_of_another_version_is_replayed_with_a_note() {
+    let folder = Folder::new("record-version");
+    let file = folder.join("run.mcap");
+    let mut begin: Value = serde_json::from_str(&beginning(&file)).unwrap();
+    assert!(!run(&["replay", text(&file)]).1.contains("note:"));
+    let simulation = &begin["begin"]["simulation"];
+    let numbers = |values: &Value| serde_json::from_value(values.clone()).unwrap();
+    let state = Content::State {
+        step: 0,
+        position: numbers(&simulation["state"]["position"]),
+        velocity: numbers(&simulation["state"]["velocity"]),
+        effort: numbers(&simulation["effort"]),
+    };
+    let ours = env!("PENDULARM_VERSION");
+    assert_eq!(begin["begin"]["version"], ours);
+    for version in ["9", "\u{1b}"] {
+        begin["begin"]["version"] = version.into();
+        write(&file, [input(begin.to_string()), state.clone()]);
+        let (status, said) = run(&["replay", text(&file)]);
+        assert_eq!(status, Some(0), "{said}");
+        let note = format!("; note: recorded by version {version:?}, and this is {ours:?}\n");
+        assert!(said.ends_with(&note), "{said}");
+    }
+}
+
+/// `tests/actors/recorder/replays.rs` has the steps and the values. Texts of a file, also its name, act on no terminal.
+#[test]
+fn a_difference_and_a_false_text_are_reported_in_one_line_and_by_the_exit_status() {
+    let folder = Folder::new("record-\u{1b}[31m-\u{202e}crafted");
+    let file = folder.join("run.mcap");
+    let begin = beginning(&file);
+    let rest = vec![0.0; 2];
+    let state = |step| Content::State {
+        step,
+        position: rest.clone(),
+        velocity: rest.clone(),
+        effort: rest.clone(),
+    };
+    // Under gravity the arm does not stay at rest. It may move already when the record begins.
+    let hostile = format!(
+        "{{\"{}\": 1}}",
+        "\u{1b}[2J\u{202e}\u{9b}31m".repeat(100_000)
     );
-    client.ask("/arm_sim/pause", json!({"data": true}));
-    runtime.stop();
-    assert_eq!(passages(&file).1, RecordEnding::Whole);
-    assert!(holds_call(&file, "{\"data\":true}"));
+    for (second, third, why) in [
+        (state(0), state(10), ": the same up to step 0, and at step "),
+        (input(hostile), state(10), "\\u"),
+    ] {
+        write(&file, [input(begin.clone()), second, third]);
+        let (status, said) = run(&["replay", text(&file)]);
+        assert_eq!(status, Some(1), "{said:?}");
+        let acts = |one: char| one != '\n' && (one.is_control() || one == '\u{202e}');
+        assert!(said.contains(why) && !said.contains(acts), "{said:?}");
+        assert!(said.lines().count() == 1 && said.len() < 2000, "{said:?}");
+        assert!(
+            said.contains("crafted-") && said.contains("/run.mcap: "),
+            "{said}"
+        );
+    }
 }

@@ -7,15 +7,14 @@ use std::time::Duration;
 
 use crate::common::{Client, Runtime, provide, signal};
 use pendularm::protocol::op::GoalStatus;
-use pendularm_client::websocket::{self as frames, LAST, opcode};
 use serde_json::{Value, json};
 
 /// The documented second, and one more for a machine that is busy with other tests.
 const LIMIT: Duration = Duration::from_secs(2);
 
-/// Sends the signal; the program must end in time, with status 0.
-fn ends_on(runtime: &mut Runtime, name: &str) {
-    signal(runtime.pid(), name);
+/// Sends SIGTERM; the program must end in time, with status 0.
+fn assert_ends(runtime: &mut Runtime) {
+    signal(runtime.pid(), "TERM");
     let (status, took) = runtime.end();
     assert!(status.success(), "{status}");
     assert!(took < LIMIT, "it took {took:?}");
@@ -29,23 +28,6 @@ fn rest(client: &mut Client) -> Vec<Value> {
         .split(|&byte| byte == b'\n')
         .filter_map(|line| serde_json::from_slice(line).ok())
         .collect()
-}
-
-#[test]
-fn a_signal_ends_an_idle_program_and_one_that_is_only_watched() {
-    for name in ["INT", "TERM"] {
-        for clients in [0, 20] {
-            let mut runtime = Runtime::start();
-            let mut watchers: Vec<Client> = (0..clients).map(|_| runtime.connect()).collect();
-            for client in &mut watchers {
-                client.subscribe("/joint_states");
-            }
-            ends_on(&mut runtime, name);
-            for client in &mut watchers {
-                assert!(client.is_closed());
-            }
-        }
-    }
 }
 
 #[test]
@@ -85,7 +67,7 @@ fn goals_calls_and_computations_end_with_the_reason_at_shutdown() {
         &json!({"op": "call_service", "id": "steps", "service": "/arm_sim/integration_step",
         "args": endless}),
     );
-    ends_on(&mut runtime, "TERM");
+    assert_ends(&mut runtime);
     let mut ends = rest(&mut client);
     for id in ["call", "steps"] {
         let is_told = |end: &Value| end["id"] == id && end["status"] == "shutting down";
@@ -102,82 +84,53 @@ fn goals_calls_and_computations_end_with_the_reason_at_shutdown() {
     }
 }
 
-/// A call of one of the runtime's services, as a line.
-fn line(service: &str, args: &Value) -> String {
-    let call = json!({"op": "call_service", "service": service, "args": args});
-    format!("{call}\n")
-}
-
-/// Repeats the same bytes until the stream ends, with or without answers.
-fn flood(client: &Client, bytes: Vec<u8>) {
-    let mut stream = client.stream().try_clone().unwrap();
-    std::thread::spawn(move || while stream.write_all(&bytes).is_ok() {});
-}
-
 /// States of work: how many clients bring the program into one, what each sends first, and what it sends without end.
-fn states() -> Vec<(&'static str, usize, Vec<u8>, Vec<u8>)> {
-    let reference = json!({"q0": [1, 2, 3], "qdot0": [30, -20, 10], "duration": 1e4, "timestep": 0.001,
-        "setpoint": [0, 0, 0], "gains": {"kp": [9, 9, 9]}, "reference": true});
+fn states() -> [(&'static str, usize, String, String); 6] {
+    let call = |service: &str, args: Value| {
+        let call = json!({"op": "call_service", "service": service, "args": args});
+        format!("{call}\n")
+    };
+    let watch = "{\"op\":\"subscribe\",\"topic\":\"/joint_states\"}\n".to_owned();
+    let pause = call("/arm_sim/pause", json!({"data": true}));
+    let steps = call("/arm_sim/step", json!({"steps": 10_000})).repeat(100);
+    let gravity = call("/arm_sim/set_params", json!({"gravity": 9})).repeat(40);
     let millions =
         json!({"function": "t", "x0": 0.1, "dt": 0.1, "steps": 1_000_000, "integrator": "euler"});
-    let trajectory = json!({"op": "publish", "topic": "/joint_trajectory",
-        "msg": {"points": [{"positions": [1, 2, 3]}]}});
-    let push = json!({"effort": [1, 1, 1], "duration": 1});
-    let arm = line("/arm_sim/set_params", &json!({"gravity": 9}))
-        + &line("/arm_sim/disturb", &push)
-        + &line("/pid_controller/set_gains", &json!({"kp": [1, 2, 3]}))
-        + &format!("{trajectory}\n");
-    // Numbers whose reading is slow, in the `id` of a goal that goes on for ever and has feedback with that `id`.
-    let id = vec!["10000000000000001268e281"; 30_000].join(",");
-    let goal = format!(
-        "{{\"op\":\"send_action_goal\",\"action\":\"/ik_action\",\"feedback\":true,\"id\":[{id}],\
-         \"args\":{{\"x\":1,\"y\":1,\"epsilon\":1e-300}}}}\n"
-    );
-    let pause = line("/arm_sim/pause", &json!({"data": true}));
-    let steps = line("/arm_sim/step", &json!({"steps": 10_000})).repeat(100);
-    let too_fast = line("/arm_sim/set_integrator", &json!({"timestep": 1e-6}));
-    let upgrade = frames::handshake("localhost", "/", "");
-    let mut ping = Vec::new();
-    frames::append(&mut ping, LAST | opcode::PING, [0; 4], &[7; 125]);
-    let once = |name, clients, text: String| (name, clients, text.into_bytes(), Vec::new());
-    let no_end = |name, clients, first: String, flood| (name, clients, first.into_bytes(), flood);
+    let millions = call("/arm_sim/integration_step", millions);
     let none = String::new;
-    let stability = line("/study/stability", &json!({})).repeat(16);
-    let integration = line("/arm_sim/integration_step", &millions);
-    let (arm, statuses) = (arm.repeat(10).into_bytes(), b"[]\n".repeat(10_000));
-    vec![
-        once(
-            "computes references",
-            20,
-            line("/study/rollout", &reference),
+    [
+        ("is idle", 0, none(), none()),
+        ("is only watched", 20, watch, none()),
+        ("is stepped by hand", 5, pause, steps),
+        ("has an arm that is flooded", 50, none(), gravity),
+        ("encodes millions of numbers", 10, millions, none()),
+        (
+            "has clients that read no statuses",
+            10,
+            none(),
+            "[]\n".repeat(10_000),
         ),
-        once("looks for stable timesteps", 20, stability),
-        no_end("is stepped by hand", 20, pause, steps.into_bytes()),
-        no_end("has an arm that is flooded", 50, none(), arm),
-        once("encodes millions of numbers", 10, integration),
-        once("cannot follow its timestep", 1, too_fast),
-        no_end("has clients that read no statuses", 10, none(), statuses),
-        no_end("reads slow frames", 5, none(), goal.into_bytes()),
-        no_end("is pinged without end", 5, upgrade, ping.repeat(100)),
     ]
 }
 
 #[test]
 fn a_signal_ends_a_program_in_every_state_of_work() {
-    for (state, clients, first, flooding) in states() {
+    for (state, clients, first, flood) in states() {
         let mut runtime = Runtime::with_links(3);
-        let kept: Vec<Client> = (0..clients).map(|_| runtime.connect()).collect();
-        for client in &kept {
-            (&mut client.stream()).write_all(&first).unwrap();
-            if !flooding.is_empty() {
-                flood(client, flooding.clone());
-            }
+        let mut kept: Vec<Client> = (0..clients).map(|_| runtime.connect()).collect();
+        for client in &mut kept {
+            client.send_bytes(first.as_bytes());
+            let (mut stream, flood) = (client.stream().try_clone().unwrap(), flood.clone());
+            // Until the stream ends, with or without answers.
+            std::thread::spawn(move || {
+                while !flood.is_empty() && stream.write_all(flood.as_bytes()).is_ok() {}
+            });
         }
         // There is no event to wait for: in some of these states nothing is answered, and in others the program soon
         // reads no further and uses no processor time. It must end at any time, so a moment on the way into a state
         // is as good.
         std::thread::sleep(Duration::from_millis(300));
         println!("a program that {state}");
-        ends_on(&mut runtime, "TERM");
+        assert_ends(&mut runtime);
     }
 }

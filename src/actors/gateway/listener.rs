@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn many_clients_may_wait_to_be_accepted_and_their_send_buffers_are_small() {
+    async fn many_clients_may_wait_to_be_accepted_and_their_sockets_have_the_options() {
         const { assert!(BACKLOG >= 300) };
         let socket = bind("127.0.0.1:0".parse().unwrap()).unwrap();
         let address = socket.local_addr().unwrap();
@@ -200,6 +200,15 @@ mod tests {
         let (stream, _) = socket.accept().await.unwrap();
         let size = SockRef::from(&stream).send_buffer_size().unwrap();
         assert!(size <= 2 * SEND_BUFFER as usize, "{size}");
+        prepare(&stream).unwrap();
+        #[cfg(target_os = "linux")]
+        {
+            let socket = SockRef::from(&stream);
+            assert!(socket.keepalive().unwrap() && socket.tcp_nodelay().unwrap());
+            assert_eq!(socket.tcp_keepalive_time().unwrap(), KEEPALIVE_IDLE);
+            assert_eq!(socket.tcp_keepalive_interval().unwrap(), KEEPALIVE_INTERVAL);
+            assert_eq!(socket.tcp_keepalive_retries().unwrap(), KEEPALIVE_PROBES);
+        }
         drop(waiting);
     }
 

@@ -4,7 +4,7 @@
 //! as `/joint_states`. Fields are in documented order, which is also the order of a positional `args` array.
 //!
 //! **Invariant:** each entry is one row of one table. A served entry is listed: the compiler checks this, because a
-//! table is an enum. A listed entry is served: `tests/actors/rosapi.rs` checks this.
+//! table is an enum. A listed entry is served: `tests/actors/refusals/` checks this.
 
 mod actions;
 mod entry;

@@ -1,7 +1,7 @@
 //! The services: one row each.
 //!
 //! **Invariant:** every service that a client can call is a row here. A row that no node serves fails
-//! `tests/actors/rosapi.rs`.
+//! `tests/actors/refusals/`.
 
 use super::entry::{Field, ServiceEntry, fields, service};
 use super::node::Node;

@@ -1,10 +1,9 @@
-//! A connection in virtual time: throttling, the delay of a slow client, and the writes of frames.
+//! A connection in virtual time: the delay of a slow client, and the writes of frames.
 //! `exchanges/connections.txt` has its calls, its stalls and its ends.
 //!
 //! **Invariant:** no test depends on the machine's speed, because times are read from the paused clock.
 
 mod pace;
-mod throttling;
 mod writes;
 
 use std::time::Duration;

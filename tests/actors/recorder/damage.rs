@@ -21,16 +21,18 @@ fn a_record_that_was_cut_anywhere_is_read_up_to_there() {
         assert_eq!(part[..], all[..part.len()]);
         assert!(part.len() >= longest);
         longest = part.len();
-        if let Ok(verdict) = replay(&file[..length]) {
-            assert_eq!(verdict.difference, None);
-            assert!(
-                verdict
-                    .to_string()
-                    .ends_with("the file ends early, and was read up to there")
-            );
+        match replay(&file[..length]) {
+            Ok(verdict) => {
+                assert_eq!(verdict.difference, None);
+                let says = verdict.to_string();
+                assert!(says.ends_with("the file ends early, and was read up to there"));
+            }
+            Err(why) => assert_eq!(why.to_string(), "the record was cut before its first state"),
         }
     }
     assert!(longest > all.len() * 9 / 10, "{longest} of {}", all.len());
+    let empty = replay(&*self::file(&[])).expect_err("nothing to replay");
+    assert!(empty.to_string().ends_with("it has no states of an arm"));
 }
 
 #[test]

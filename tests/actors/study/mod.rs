@@ -21,9 +21,7 @@ use actix::prelude::*;
 use pendularm::actors::arm::sim::{
     ArmSettings, Connect, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetParams,
 };
-use pendularm::actors::compute::study::{
-    IntegrationStep, PlanRun, PredictStability, Refused, RunOffline, Study, SuggestGains,
-};
+use pendularm::actors::compute::study::{IntegrationStep, PredictStability, RunOffline, Study};
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::node::Unserved;
@@ -38,8 +36,8 @@ use pendularm::study::control_loop::{ControlLoop, no_control};
 use pendularm::study::gains::{GainsRequirements, search_gains};
 use pendularm::study::motion::Motion;
 use pendularm::study::paused::at_once;
-use pendularm::study::planner::{PlanError, Task, plan};
-use pendularm::study::stability::{Limits, limit_held, limits};
+use pendularm::study::planner::{Task, plan};
+use pendularm::study::stability::{Limits, limits};
 use serde_json::{Value, json};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{sleep, timeout};

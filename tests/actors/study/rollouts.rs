@@ -69,16 +69,20 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
 #[test]
 fn an_empty_rollout_is_ten_seconds_of_the_present_free_arm() {
     in_real_time(async {
-        let bench = study::<3>();
-        let run = bench.ask(RunOffline::default()).await.unwrap().run;
-        let mut live = Simulation::new(settings::<3>().control.arm, no_control());
+        let bench = study::<2>();
+        let values = caller_of(&bench)
+            .await
+            .ask(Service::Rollout.name(), json!({}))
+            .await;
+        let mut live = Simulation::new(settings::<2>().control.arm, no_control());
         live.set_method(Method::Midpoint);
         live.set_timestep(0.002);
         live.advance(5000);
-        assert_eq!(run.times.len(), 1001);
-        assert_eq!(run.times[1000], live.time());
-        assert_eq!(run.positions[1000], live.state().position);
-        assert_eq!(run.positions[0], [0.0; 3]);
-        assert_eq!(run.evaluations, 10_000);
+        assert_eq!(values["times"].as_array().unwrap().len(), 1001);
+        assert_eq!(values["times"][1000], live.time());
+        let positions = joints(&values["positions"]);
+        assert_eq!(positions[1000], live.state().position);
+        assert_eq!(positions[0], [0.0; 2]);
+        assert_eq!(values["evaluations"], 10_000);
     });
 }

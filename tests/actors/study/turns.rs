@@ -99,26 +99,3 @@ fn heavy_rollouts_delay_an_integration_by_its_fair_share_and_no_more() {
         );
     });
 }
-
-#[test]
-fn the_arms_own_question_is_answered_by_the_pool() {
-    in_real_time(async {
-        let bench = study::<2>();
-        let control = settings::<2>().control;
-        let limit = bench.node.send(HeldLimit(control)).await.unwrap();
-        assert_eq!(limit, Some(clock_limits(&control)));
-        assert_eq!(limit.unwrap().timestep, limit_held(&control));
-        let arm = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap();
-        let free = ControlLoop {
-            arm,
-            gains: no_control(),
-            ..control
-        };
-        let limit = bench.node.send(HeldLimit(free)).await.unwrap();
-        let nothing = ClockLimits {
-            period: None,
-            timestep: None,
-        };
-        assert_eq!(limit, Some(nothing));
-    });
-}

@@ -25,6 +25,20 @@ fn the_papers_list_every_topic_with_its_type_and_owner() {
     }
 }
 
+/// `tests/actors/exchanges/arm.txt` has the keys of a message.
+#[test]
+fn the_papers_list_the_keys_of_diagnostics() {
+    let exchanges = text("tests/actors/exchanges/arm.txt");
+    let sent = exchanges
+        .lines()
+        .find(|line| line.contains("\"key\":\"sim_time\""));
+    let sent = sent.unwrap().split("{\"key\":\"").skip(1);
+    let sent: Vec<&str> = sent.filter_map(|one| one.split('"').next()).collect();
+    let rows = table(&text("docs/protocol.md"), "status");
+    let listed: Vec<&str> = rows.iter().flat_map(|row| codes(&row[1])).collect();
+    assert_eq!(listed, sent);
+}
+
 #[test]
 fn the_papers_list_every_op() {
     let rows = table(&text("docs/protocol.md"), "op");

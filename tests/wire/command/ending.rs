@@ -3,10 +3,8 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
-use std::net::{SocketAddr, TcpListener};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
-use std::thread;
 
 use crate::common::{self, Runtime, complaint};
 use crate::folder::Folder;
@@ -56,59 +54,6 @@ fn without_a_runtime_the_status_is_3() {
             said.contains(&format!("cannot connect to {address}: ")),
             "{said}"
         );
-    }
-}
-
-/// A server that sends these bytes to every client, and then closes or sends nothing more.
-fn server(says: &'static [u8], closes: bool) -> SocketAddr {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
-    thread::spawn(move || {
-        let mut kept = Vec::new();
-        for stream in listener.incoming() {
-            let mut stream = stream.unwrap();
-            let _ = stream.write_all(says);
-            if closes {
-                // Reads the opening and a frame, so that the connection ends without a reset.
-                BufReader::new(&stream).lines().take(2).for_each(drop);
-            } else {
-                kept.push(stream);
-            }
-        }
-    });
-    address
-}
-
-#[test]
-fn an_absent_or_silent_server_gives_status_3() {
-    for (says, closes, word) in [
-        (&b""[..], true, "closed"),
-        (
-            b"HTTP/1.1 400 Bad Request\r\n",
-            false,
-            "cannot read a frame",
-        ),
-        (b"{\"op\":", true, "within a frame"),
-        (b"[1, 2]\n", false, "cannot read a frame"),
-        (b"", false, "no answer or message within 0.2 s"),
-        (
-            b"{\"op\":\"service_response\",\"id\":7}\n",
-            false,
-            "no answer or message within",
-        ),
-    ] {
-        let address = server(says, closes).to_string();
-        let is_silent = word.starts_with("no answer");
-        let patience = if is_silent {
-            "0.2".to_owned()
-        } else {
-            common::PATIENCE.as_secs().to_string()
-        };
-        for command in [COMMANDS[0], COMMANDS[5], COMMANDS[11]] {
-            let line = format!("{command} --connect {address} --timeout {patience}");
-            let said = complaint(&output(&line), 3);
-            assert!(said.contains(word), "{command:?}: {said}");
-        }
     }
 }
 
@@ -178,16 +123,6 @@ fn the_pages_of_help_have_examples_and_the_exit_statuses() {
         let widest = page.lines().map(|line| line.chars().count()).max();
         assert!(widest <= Some(125), "{page}");
     }
-}
-
-/// The controller is off at the start, and the command would wait for the goal without end.
-#[test]
-fn the_examples_of_a_goal_begin_with_the_controller() {
-    let page = output("action send_goal --help");
-    let page = String::from_utf8(page.stdout).unwrap();
-    let examples = page.split_once("Examples:\n").unwrap().1;
-    let first = "  pendularm service call /pid_controller/enable '{data: true}'";
-    assert!(examples.starts_with(first), "{examples}");
 }
 
 #[test]

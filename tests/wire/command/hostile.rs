@@ -95,6 +95,38 @@ fn an_unexpected_frame_extends_no_timeout() {
     }
 }
 
+#[test]
+fn a_server_that_closes_or_gives_no_answer_ends_a_command_with_status_3() {
+    for (says, closes, timeout, why) in [
+        (&b""[..], true, "60", "closed"),
+        (
+            b"HTTP/1.1 400 Bad Request\r\n",
+            false,
+            "60",
+            "cannot read a frame",
+        ),
+        (b"{\"op\":", true, "60", "within a frame"),
+        (b"[1, 2]\n", false, "60", "cannot read a frame"),
+        (
+            b"{\"op\":\"service_response\",\"id\":7}\n",
+            false,
+            "0.2",
+            "within 0.2 s",
+        ),
+    ] {
+        let address = server(move |stream| {
+            stream.write_all(says).unwrap();
+            if !closes {
+                hold(stream);
+            }
+        });
+        let arguments = [&CALL[..], &["--timeout", timeout]].concat();
+        let (status, out, complaint) = end(start(&arguments, &address));
+        assert_eq!((status, out.as_str()), (Some(3), ""), "{why}");
+        assert!(complaint.contains(why), "{complaint}");
+    }
+}
+
 /// The messages take half as long again together as each may; each takes so little of that that a machine may be busy.
 #[test]
 fn each_message_has_the_whole_time_to_come() {

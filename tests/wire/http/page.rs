@@ -6,8 +6,9 @@ use std::process::Stdio;
 
 use crate::common::{Logged, Runtime, program};
 use crate::folder::Folder;
-use crate::web_client::{exchange, get, handshake};
+use crate::web_client::{exchange, get};
 use pendularm::web::page::ASSETS;
+use pendularm_client::websocket::handshake;
 
 #[test]
 fn the_page_and_its_files_are_served_with_their_types() {
@@ -77,8 +78,11 @@ fn the_log_names_the_pages_address_at_the_start() {
 #[test]
 fn the_log_names_the_option_for_a_foreign_origin() {
     let mut runtime = Logged::start(program(), Stdio::null());
-    let headers = handshake(runtime.address) + "Origin: https://class.example\r\n";
-    let request = format!("GET / HTTP/1.1\r\n{headers}\r\n");
+    let (host, origin) = (
+        runtime.address.to_string(),
+        "Origin: https://class.example\r\n",
+    );
+    let request = handshake(&host, "/", origin);
     exchange(runtime.address, request.as_bytes());
     let line = runtime.await_line("--allow-origin");
     assert!(line.contains("WARN"), "{line}");

@@ -1,4 +1,4 @@
-//! The variables of the environment, tried with the program itself; `launch.rs` has their effects on clients.
+//! The variables of the environment, tried with the program itself.
 
 use std::process::Output;
 

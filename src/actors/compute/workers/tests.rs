@@ -97,3 +97,19 @@ fn a_panic_leaves_the_worker_working() {
     pool.submit(computation("next", 1, &log));
     assert_eq!(seen.recv().unwrap(), "next");
 }
+
+#[test]
+fn the_end_of_the_pool_refuses_running_waiting_and_new_computations() {
+    let (log, seen) = mpsc::channel();
+    let pool = WorkerPool::start(1).unwrap();
+    pool.submit(computation("runs", usize::MAX, &log));
+    assert_eq!(seen.recv().unwrap(), "runs");
+    pool.submit(computation("waits", usize::MAX, &log));
+    pool.close("over");
+    pool.submit(computation("comes", 1, &log));
+    drop(log);
+    let mut refused: Vec<String> = seen.iter().filter(|one| one.ends_with("over")).collect();
+    refused.sort_unstable();
+    assert_eq!(refused, ["comes: over", "runs: over", "waits: over"]);
+    assert!(pool.is_idle());
+}
