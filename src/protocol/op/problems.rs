@@ -64,7 +64,7 @@ pub enum Problem {
         /// The received value, shortened.
         found: String,
     },
-    /// A name is longer than it may be: [`MAX_NAME`].
+    /// A name is longer than it may be: [`MAX_NAME`](super::MAX_NAME).
     #[error("{op}: {field} must be at most {limit} bytes long, got {length}")]
     TooLong {
         /// The operation.

@@ -41,6 +41,7 @@ fn acts(character: char) -> bool {
 
 /// A text with JSON's escapes where a character [acts]. The syntax of JSON has no such character, so each is part of a
 /// text.
+#[cfg(feature = "runtime")]
 pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len() + 1);
     for character in text.chars() {
