@@ -129,7 +129,8 @@ pub(crate) fn mistyped(expected: &str, raw: &RawValue) -> String {
 
 /// The reason why an array of `got` entries is rejected.
 pub(crate) fn too_many(limit: usize, got: usize) -> String {
-    format!("must have at most {limit} entries, got {got}")
+    let entries = if limit == 1 { "entry" } else { "entries" };
+    format!("must have at most {limit} {entries}, got {got}")
 }
 
 /// The reason why an array is rejected that does not have `expected` entries.

@@ -26,19 +26,17 @@ pub enum Foreign {
 }
 
 impl Foreign {
-    /// One line for the status: the recognised protocol, and those of this port.
+    /// One line for the status: the recognised protocol, and what to use instead.
     #[must_use]
     pub const fn explanation(self) -> &'static str {
         match self {
             Self::Http => {
-                "this is an HTTP request, and this port speaks rosbridge JSON over plain TCP, one object per line"
+                "this is an HTTP request that this port does not serve: it speaks rosbridge JSON, one object per line"
             }
             Self::Tls => {
-                "this is a TLS hello, and this port speaks rosbridge JSON over plain TCP, one object per line"
+                "this is a TLS hello, and this port speaks without TLS: no https:// and no wss://"
             }
-            Self::Bson => {
-                "this is BSON, and this port speaks rosbridge JSON over plain TCP, one object per line"
-            }
+            Self::Bson => "this is BSON, and this port speaks rosbridge JSON, one object per line",
         }
     }
 }

@@ -100,8 +100,8 @@ impl<const N: usize> Callable for SuggestGains<N> {
             method: fields.choice("integrator", &Method::ALL, Method::name),
             params: fields.object("params", SetParams::of),
         };
-        if ask.margin.is_some_and(|margin| margin < 1.0) {
-            fields.refuse("margin", &"must be at least 1");
+        if let Some(margin) = ask.margin.filter(|margin| *margin < 1.0) {
+            fields.refuse("margin", &format_args!("must be at least 1, got {margin}"));
         }
         fields.accept(ask)
     }
