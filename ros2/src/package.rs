@@ -70,7 +70,7 @@ fn interfaces() -> BTreeMap<String, String> {
 /// A part's definition: constants, then fields with their units.
 fn text(part: &Type) -> String {
     let constants = part.constants.iter();
-    let constants = constants.map(|one| format!("{} {}={}\n", one.kind, one.name, one.value));
+    let constants = constants.map(|one| format!("byte {}={}\n", one.name, one.value));
     // ROS 2 adds its filler to an empty type itself.
     let fields = part.fields.iter().filter(|field| !NOTHING.contains(field));
     let fields = fields.map(|field: &Field| {
