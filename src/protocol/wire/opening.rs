@@ -34,7 +34,7 @@ impl Foreign {
                 "this is an HTTP request that this port does not serve: it speaks rosbridge JSON, one object per line"
             }
             Self::Tls => {
-                "this is a TLS hello, and this port speaks without TLS: no https:// and no wss://"
+                "this is a TLS hello, and this port speaks rosbridge JSON without TLS: no https:// and no wss://"
             }
             Self::Bson => "this is BSON, and this port speaks rosbridge JSON, one object per line",
         }
