@@ -99,12 +99,17 @@ pub fn read_note<const N: usize>(note: &str) -> Result<Note<N>, NoteError> {
     };
     Ok(Note::Input(match kind.as_str() {
         "begin" => {
-            let simulation = Noted::read("begin", &value["simulation"])?;
+            let simulation: Checkpoint<N> = Noted::read("begin", &value["simulation"])?;
+            require_positive(simulation.timestep)?;
             return Ok(Note::Begin(Box::new(simulation)));
         }
         "diverged" => return Ok(Note::Diverged),
         "method" => ArmInput::Method(Noted::read("method", value)?),
-        "timestep" => ArmInput::Timestep(Noted::read("timestep", value)?),
+        "timestep" => {
+            let timestep = Noted::read("timestep", value)?;
+            require_positive(timestep)?;
+            ArmInput::Timestep(timestep)
+        }
         "params" => ArmInput::Arm(Noted::read("params", value)?),
         "gains" => ArmInput::Gains(Noted::read("gains", value)?),
         "enable" => ArmInput::Enabled(Noted::read("enable", value)?),
@@ -120,6 +125,11 @@ pub fn read_note<const N: usize>(note: &str) -> Result<Note<N>, NoteError> {
         "reset" => ArmInput::Reset,
         other => return Err(NoteError::Kind(other.to_owned())),
     }))
+}
+
+fn require_positive(timestep: f64) -> Result<(), NoteError> {
+    let is_positive = (timestep > 0.0).then_some(());
+    is_positive.ok_or(NoteError::Field("timestep", "be greater than 0"))
 }
 
 // ---- the values in them ---------------------------------------------------------------------------------------------
@@ -156,7 +166,19 @@ noted! {
     [const N: usize] Gains<N> { kp, ki, kd }
     [const N: usize] Setpoint<N> { position, velocity }
     [const N: usize] State<N> { position, velocity }
-    [] ControlPeriod { period, delay }
+}
+
+impl Noted for ControlPeriod {
+    fn write(&self) -> Value {
+        json!({"period": self.period, "delay": self.delay})
+    }
+
+    fn read(name: &'static str, from: &Value) -> Result<Self, NoteError> {
+        let period = Noted::read("period", &from["period"])?;
+        let delay = Noted::read("delay", &from["delay"])?;
+        let read = Some(Self { period, delay }).filter(|one| one.period >= 0.0);
+        read.ok_or(NoteError::Field(name, "not be negative"))
+    }
 }
 
 impl<const N: usize> Noted for Arm<N> {
@@ -237,4 +259,31 @@ noted_scalars! {
     f64: Value::as_f64, "be a number";
     bool: Value::as_bool, "be true or false";
     u64: |from: &Value| from.as_u64().filter(|steps| *steps <= MAX_STEPS), "be at most 2^53";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::simulation::Simulation;
+
+    #[test]
+    fn an_input_that_no_arm_accepts_is_refused_by_its_field() {
+        let simulation = Simulation::new(Arm::<2>::default(), Gains::default());
+        let begin = write_note(&Note::Begin(Box::new(simulation.checkpoint())));
+        let mut stopped: Value = serde_json::from_str(&begin).unwrap();
+        stopped["begin"]["simulation"]["timestep"] = 0.into();
+        assert!(read_note::<2>(&begin).is_ok());
+        let timestep = "timestep must be greater than 0";
+        for (note, why) in [
+            (&*stopped.to_string(), timestep),
+            ("{\"timestep\":0}", timestep),
+            ("{\"timestep\":-0.001}", timestep),
+            (
+                "{\"period\":{\"period\":-1,\"delay\":false}}",
+                "period must not be negative",
+            ),
+        ] {
+            assert_eq!(read_note::<2>(note).unwrap_err().to_string(), why);
+        }
+    }
 }
