@@ -46,14 +46,13 @@ pub fn read_setpoint<const N: usize>(msg: &Payload) -> Result<Setpoint<N>, Rejec
     let names = names.and_then(|names| json::entries(names, N));
 
     let field = format!("{field}.positions");
-    let count = positions.and_then(|raw| Some(json::entries(raw, 0)?.count));
-    let names_of_another_length = names
-        .as_ref()
-        .filter(|_| count.is_some_and(|count| count != N));
     let position = required(positions, &field)
         .and_then(|raw| numbers(raw, &field))
         .map_err(|rejection| {
-            with_missing_joints(rejection, names_of_another_length, &joint_names::<N>())
+            let count = positions.and_then(|raw| Some(json::entries(raw, 0)?.count));
+            let is_another = count.is_some_and(|count| count != N);
+            let names = names.as_ref().filter(|_| is_another);
+            with_missing_joints(rejection, names, &joint_names::<N>())
         })?;
     let velocity = velocities.and_then(|raw| numbers(raw, "velocities").ok());
     let order = names.and_then(|names| order(&names));

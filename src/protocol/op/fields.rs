@@ -11,6 +11,7 @@ use std::fmt;
 
 use serde_json::value::RawValue;
 
+use super::rejections::NOT_FINITE;
 pub use super::rejections::{Bound, RejectedField, Rejections};
 pub(crate) use super::rejections::{MISSING, finite, mistyped, too_many, wrong_length};
 
@@ -201,7 +202,7 @@ impl<'a> Fields<'a> {
             Some(value) if value > limit => self.mistyped(name, &format!("at most {limit}"), raw),
             Some(value) if value > 0 => Some(value),
             _ if json::number(raw).is_some_and(f64::is_infinite) => {
-                self.rejected_as(name, "must be a finite number")
+                self.rejected_as(name, NOT_FINITE)
             }
             _ => self.mistyped(name, "an integer, at least 1", raw),
         }
@@ -219,11 +220,12 @@ impl<'a> Fields<'a> {
         options: &[T],
         name_of: impl Fn(T) -> &'static str,
     ) -> Option<T> {
-        let names: Vec<&str> = options.iter().map(|&option| name_of(option)).collect();
-        self.value(name, &format!("one of {}", names.join(", ")), |raw| {
-            let text = json::text(raw)?;
-            let index = names.iter().position(|name| *name == text)?;
-            options.get(index).copied()
+        let raw = self.take(name)?;
+        let text = json::text(raw);
+        let is_meant = |option: &T| Some(name_of(*option)) == text.as_deref();
+        options.iter().copied().find(is_meant).or_else(|| {
+            let names: Vec<&str> = options.iter().map(|&option| name_of(option)).collect();
+            self.mistyped(name, &format!("one of {}", names.join(", ")), raw)
         })
     }
 

@@ -1,5 +1,8 @@
 //! Reads the frames of one client, and has their ops performed by the registry, one at a time.
 //!
+//! The actor polls the reader after each message that it has handled. So the reader may wait for the client's state
+//! without a waker.
+//!
 //! **Invariant:** the next frame is parsed after the last op has taken effect, except for pure computations. So a
 //! client's requests take effect in the order sent. A series of messages counts as one op. One poll reads a bounded
 //! number of bytes and performs a bounded number of ops. Every frame becomes one op or one error.

@@ -15,7 +15,6 @@ use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTE
 pub(crate) struct Directory(BTreeMap<Served, BTreeMap<Arc<str>, Provider>>);
 
 /// The client that serves a service or an action.
-#[derive(Clone)]
 pub(crate) struct Provider {
     pub(crate) connection: ConnectionId,
     /// The provider's spelling of the name. Requests to it have this spelling.

@@ -1,7 +1,7 @@
 //! The registry has every client, topic and service. It fans messages out to subscribers, and routes calls.
 //!
-//! This file has its state, its messages and their handlers. `topics.rs` and `requests.rs` have the rosbridge ops, with
-//! their tables.
+//! This file has its state with the table of topics, its messages and their handlers. `topics.rs` and `requests.rs` have
+//! the rosbridge ops.
 //!
 //! **Invariant:** a message is encoded once for any number of subscribers, and not at all without subscribers. A
 //! refused op changes nothing. It gets an error status, or the call's one response. Messages of one sender take effect

@@ -279,7 +279,7 @@ impl Registry {
         encode: impl FnOnce(&str, &str) -> Bytes,
     ) -> Result<(), Refusal> {
         let absolute = &*names::absolute(name);
-        let Some(provider) = self.directory.provider(kind, absolute).cloned() else {
+        let Some(provider) = self.directory.provider(kind, absolute) else {
             return Err(match kind {
                 Served::Service => NoService::NoProvider(name.to_owned()).into(),
                 Served::Action => Refusal::NoAction(name.to_owned()),
@@ -316,8 +316,8 @@ impl Registry {
             _done: done,
             _entry: caller.kept.enter(bytes, None)?,
         });
-        if let Some(client) = self.clients.get(&provider.connection) {
-            client.send(self.covered(encode(&provider.spelling, &known_as)));
+        if let Some(server) = server {
+            server.send(self.covered(encode(&provider.spelling, &known_as)));
         }
         Ok(())
     }

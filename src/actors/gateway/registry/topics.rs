@@ -1,6 +1,5 @@
-//! The topics of clients: advertisements, subscriptions and published messages, and the table of topics with the
-//! publishers, subscribers and type of each. A message is encoded once for each spelling of its topic and each requested
-//! encoding, and is delivered to every subscriber.
+//! The topics of clients: advertisements, subscriptions and published messages. A message is encoded once for each
+//! spelling of its topic and each requested encoding, and is delivered to every subscriber.
 //!
 //! **Invariant:** a refused op changes nothing. Without subscribers nothing is encoded. Subscribers that requested the
 //! same encoding share the same bytes. A long message delays only its publisher. The table has a topic exactly as long
