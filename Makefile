@@ -136,7 +136,7 @@ bench-ros2: build ## Measure that bridge between two hosts with up to 50 subscri
 	@echo "make bench-ros2: a build of some minutes the first time, then three minutes; run it on a quiet machine"
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash ros2/tests/bench.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
 
-mutants: ## Count the small code changes that tests notice; takes hours. ARGS="math --file src/math/pid.rs", "actors --shard 0/20" or --check
+mutants: ## Count the small code changes that tests notice; takes hours. ARGS="math --re pid.rs", "actors --shard 0/20" or --check
 	@echo "make mutants: needs cargo-mutants; outcomes are in target/mutants"
 	@bash scripts/mutants.sh $(ARGS)
 
