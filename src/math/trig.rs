@@ -67,8 +67,11 @@ pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
     let shifted = entries!(any, i => angles[i] * FRAC_2_PI + ROUND);
     let k = entries!(any, i => shifted[i] + -ROUND);
     let first = entries!(any, i => angles[i].sub_exact_product(k[i], HALF_PI[0]));
-    let r = entries!(any, i => first[i].sub_exact_product(k[i], HALF_PI[1]));
-    let tail = entries!(any, i => (first[i] - r[i]).sub_exact_product(k[i], HALF_PI[1]) - k[i] * HALF_PI[2]);
+    // A product that is used twice is computed once: multipliers are what the registers wait for. It is exact, so the
+    // bits are those of a fused operation.
+    let second = entries!(any, i => k[i] * HALF_PI[1]);
+    let r = entries!(any, i => first[i] - second[i]);
+    let tail = entries!(any, i => ((first[i] - r[i]) - second[i]) - k[i] * HALF_PI[2]);
 
     let r2 = entries!(any, i => r[i] * r[i]);
     let r4 = entries!(any, i => r2[i] * r2[i]);
@@ -83,9 +86,10 @@ pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
     });
     let cosine = entries!(any, i => {
         let one = any.like(1.0);
-        let head = one.sub_exact_product(r2[i], 0.5);
+        let half = r2[i] * 0.5;
+        let head = one - half;
         let low = r4[i] * (r2[i] * C[1] + C[0]) - r[i] * tail[i];
-        head + (((one - head).sub_exact_product(r2[i], 0.5) + low) + r4[i] * r4[i] * c[i])
+        head + ((((one - head) - half) + low) + r4[i] * r4[i] * c[i])
     });
 
     let (mut sin, mut cos) = (sine, cosine);

@@ -244,7 +244,7 @@ impl<T: Number> Carried<T> {
     #[inline(always)]
     fn hinge(&self, u: T, w: T, x_axis: Planar<T>) -> Hinge<T> {
         Hinge {
-            free: (u * 3.0 + self.b3 * w) - self.bias_y3,
+            free: (((u + u) + u) + self.b3 * w) - self.bias_y3,
             x: (self.b3 * x_axis.x).sub_exact_product(x_axis.y, 0.5),
             y: (self.b3 * x_axis.y).sub_exact_product(x_axis.x, -0.5),
         }
@@ -256,13 +256,14 @@ impl<T: Number> Carried<T> {
         let big_w = self.big_w;
         let big_x = big_w + (self.a + self.det3);
         let one_a = self.a + 1.0;
-        let half_b = self.b3 * (1.0 / 6.0);
+        let (half_b, half_w) = (self.b3 * (1.0 / 6.0), big_w * 0.5);
         Body {
             big_w,
             big_x,
             half_b,
+            half_w,
             d: big_x.sub_exact_product(one_a, 0.25) * THIRD,
-            phi: (self.b3 * u - w * big_x.sub_exact_product(big_w, 0.5)) + self.stiff,
+            phi: (self.b3 * u - w * (big_x - half_w)) + self.stiff,
             psi: (u * one_a + half_b * w) - self.soft,
             quotient: u.like(1.0) / (big_w * big_x),
         }
@@ -278,6 +279,8 @@ struct Body<T> {
     big_x: T,
     /// `-X k`.
     half_b: T,
+    /// `W / 2`.
+    half_w: T,
     /// `X d`.
     d: T,
     /// `X φ`.
@@ -307,8 +310,7 @@ impl<T: Number> Body<T> {
             self.big_x * y - self.half_b * x,
         );
         let d = self.big_w * self.d;
-        let half_w = self.big_w * 0.5;
-        let q = self.quotient;
+        let (half_w, q) = (self.half_w, self.quotient);
         let m3q = m3 * q;
         let bias = Planar::new(
             self.phi * v.x - self.psi * (half_w * y),
