@@ -9,6 +9,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions, Writer};
 use serde::Deserialize;
+use serde::de::Error as _;
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
@@ -18,7 +19,6 @@ use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::ros::cdr;
 use crate::protocol::ros::rosapi::DISTRO;
-use crate::protocol::ros::tree::MessageTree;
 
 /// Length at which a chunk is written without waiting for the next second.
 pub const CHUNK_BYTES: u64 = 64 * 1024;
@@ -216,8 +216,10 @@ impl<W: Write> McapWriter<W> {
         let Some(one) = types::find(topic.type_name()) else {
             return Ok(());
         };
-        let msg = MessageTree::read(msg.as_bytes())?;
-        self.put(at, topic.name(), one, &cdr::encode_tree(one, &msg))
+        let msg: &RawValue = serde_json::from_str(msg)?;
+        let data = cdr::encode_within(one, msg, usize::MAX);
+        let data = data.ok_or_else(|| serde_json::Error::custom("a string is not valid text"))?;
+        self.put(at, topic.name(), one, &data)
     }
 
     fn put(

@@ -5,9 +5,11 @@
 //! messages.
 
 use bytes::Bytes;
+use serde_json::value::RawValue;
 
-use super::tree::MessageTree;
+use crate::protocol::catalog::types::Type;
 use crate::protocol::names;
+use crate::protocol::wire::json;
 
 /// The text of a stamp before and between its two numbers, and the ROS 1 names of the two.
 const SECONDS: &[u8] = b"\"sec\":";
@@ -19,14 +21,19 @@ pub fn is_ros1_name(asked: &str, type_name: &str) -> bool {
     asked != type_name && asked == names::short_type(type_name)
 }
 
-/// The member of a message for a field of its ROS 2 type. Seconds and nanoseconds may have their ROS 1 names.
-pub(super) fn member<'t, 'a>(msg: &'t MessageTree<'a>, field: &str) -> Option<&'t MessageTree<'a>> {
-    let ros1_name = match field {
-        "sec" => "secs",
-        "nanosec" => "nsecs",
-        _ => return msg.get(field),
-    };
-    msg.get(field).or_else(|| msg.get(ros1_name))
+/// The members of a message for the fields of its ROS 2 type, in their order. The second of each is the member with the
+/// ROS 1 name of seconds or nanoseconds. `None` if the message is not an object.
+pub(super) fn members(one: Type, msg: &RawValue) -> Option<Vec<[Option<&RawValue>; 2]>> {
+    let names = one.fields.iter().flat_map(|field| match field.name {
+        "sec" => ["sec", "secs"],
+        "nanosec" => ["nanosec", "nsecs"],
+        // The first of equal names counts.
+        name => [name, name],
+    });
+    let names: Vec<&str> = names.collect();
+    let mut values = vec![None; names.len()];
+    json::members_into(msg.get(), &names, &mut values).ok()?;
+    Some(values.as_chunks().0.to_vec())
 }
 
 /// A frame of the runtime in which every stamp has `secs` and `nsecs` besides `sec` and `nanosec`. A text cannot
