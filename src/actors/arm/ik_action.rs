@@ -13,14 +13,13 @@ use actix::prelude::*;
 use serde::Serialize;
 
 use crate::actors::arm::sim::{
-    ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal, Tracking, joint_names,
+    ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal, Tracking,
 };
 use crate::actors::node::{Ask, Asker, Barrier, Call, Done, Publish, Reply, ShutDown, Unserved};
 use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal, Goal, SentGoal};
 use crate::actors::wire::{Callable, Nodes};
 use crate::math::goal::Outcome;
 use crate::protocol::catalog::{Action, Service, Topic};
-use crate::protocol::messages::goal::setpoint_trajectory;
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::op::{Arguments, GoalStatus};
 use crate::services::goals::AcceptedGoal;
@@ -363,9 +362,9 @@ impl<const N: usize> IkAction<N> {
         let Some(goal) = &self.active else {
             return;
         };
-        let (number, positions) = (goal.goal.number, goal.goal.positions);
-        let trajectory = move || setpoint_trajectory(&joint_names::<N>(), &positions);
-        self.publish(Topic::JointTrajectory, trajectory);
+        let goal = goal.goal.clone();
+        let (number, positions) = (goal.number, goal.positions);
+        self.publish(Topic::JointTrajectory, move || goal.trajectory());
         self.arm.command.do_send(CommandGoal { number, positions });
     }
 

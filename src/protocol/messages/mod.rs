@@ -5,7 +5,6 @@
 //!
 //! **Invariant:** one frame is one line of valid JSON.
 
-pub mod goal;
 pub mod scene;
 mod telemetry;
 
