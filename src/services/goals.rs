@@ -10,7 +10,7 @@ use super::arm::joint_names;
 use super::{Address, Answered, Ask, Callable};
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::{Target, Unreachable};
-use crate::protocol::catalog::{Node, Service};
+use crate::protocol::catalog::Service;
 use crate::protocol::messages::{Empty, Stamp};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
@@ -80,7 +80,7 @@ pub struct GoalRequest<const N: usize> {
 }
 
 impl<const N: usize> Ask for GoalRequest<N> {
-    type Answer = Result<String, GoalRejected>;
+    type Answer = Result<String, Unreachable>;
 }
 
 impl<const N: usize> Callable for GoalRequest<N> {
@@ -104,20 +104,9 @@ impl<const N: usize> Callable for GoalRequest<N> {
 }
 
 impl<const N: usize> Answered for GoalRequest<N> {
-    fn write(answer: Result<String, GoalRejected>, to: &Address) -> Bytes {
+    fn write(answer: Result<String, Unreachable>, to: &Address) -> Bytes {
         to.outcome(answer.map(|goal_id| json!({"goal_id": goal_id})))
     }
-}
-
-/// Why a goal was not accepted. Nothing has changed.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum GoalRejected {
-    /// There is no solution.
-    #[error(transparent)]
-    Unsolved(#[from] Unreachable),
-    /// The arm's actor has ended.
-    #[error("{} does not answer", Node::ArmSim.name())]
-    NoAnswer,
 }
 
 /// Preempts a goal if it is the active one. Answered after its result has been published.
@@ -160,12 +149,6 @@ pub enum CancelRejected {
         /// The active goal.
         active: String,
     },
-    /// The client has not sent the active goal under this id.
-    #[error("{NOT_ACTIVE}")]
-    NotSent,
-    /// The arm's actor has ended.
-    #[error("{} does not answer", Node::ArmSim.name())]
-    NoAnswer,
 }
 
 /// An accepted goal.

@@ -5,9 +5,10 @@
 
 use pendularm::live::{GoalOrder, GoalProgress, Obstacle};
 use pendularm::math::goal::Outcome;
+use pendularm::math::kinematics::Unreachable;
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages::{self, Level};
-use pendularm::services::goals::{AcceptedGoal, CancelRejected, GoalRejected, GoalRequest};
+use pendularm::services::goals::{AcceptedGoal, CancelRejected, GoalRequest};
 use pendularm::services::{Address, Answered as _};
 
 use super::Kernel;
@@ -50,7 +51,7 @@ impl<const N: usize> Kernel<N> {
         &mut self,
         goal: GoalRequest<N>,
         of_trial: bool,
-    ) -> Result<Option<Obstacle>, GoalRejected> {
+    ) -> Result<Option<Obstacle>, Unreachable> {
         let GoalRequest { target, criteria } = goal;
         let number = self.accepted + 1;
         let tracking = self.arm.track_goal(&GoalOrder {

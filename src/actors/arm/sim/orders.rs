@@ -104,7 +104,7 @@ impl<const N: usize> ArmOrder<N> for CommandEffort<N> {
     fn perform(self, node: &mut ArmSim<N>) {
         let Self { effort, message } = self;
         match node.arm.command(effort) {
-            Ok(()) => node.commander = Some(message.present),
+            Ok(()) => node.commander = Some(message.link),
             Err(why) => message.refuse(Topic::EffortCommands, &why),
         }
     }

@@ -283,9 +283,7 @@ impl Registry {
         }
         listener(TopicMessage {
             msg,
-            respond: ctx.address().recipient(),
-            connection: origin.from,
-            present: Arc::downgrade(&client.present),
+            link: client.link.clone(),
             listening: Arc::downgrade(&client.listening),
             id: origin.id,
             done,

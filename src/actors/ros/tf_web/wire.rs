@@ -35,7 +35,7 @@ impl<const N: usize> TfRepublisher<N> {
         let subscribe = |(id, goal), message: TopicMessage| {
             let by = FrameReceiver::Topic {
                 id,
-                connection: message.connection,
+                connection: message.link.connection,
                 listening: message.listening,
             };
             SubscribeFrames { goal, by }
