@@ -50,7 +50,7 @@ use crate::protocol::wire::json::Payload;
 /// The registry actor.
 #[derive(Default)]
 pub struct Registry {
-    clients: HashMap<ConnectionId, Client>,
+    clients: BTreeMap<ConnectionId, Client>,
     topics: Topics,
     directory: Directory,
     /// Calls and goals that wait for the clients that serve them.
@@ -711,10 +711,7 @@ impl Handler<FinishAll> for Registry {
     type Result = ();
 
     fn handle(&mut self, _: FinishAll, _: &mut Context<Self>) {
-        // Sorted, so that the order is the same in every run.
-        let mut clients: Vec<_> = self.clients.iter().collect();
-        clients.sort_unstable_by_key(|(id, _)| **id);
-        for (_, client) in clients {
+        for client in self.clients.values() {
             client.outlets.mailbox.do_send(ToClient::Finish);
         }
     }
