@@ -42,7 +42,7 @@ use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, ErrorForm, Level};
 use crate::protocol::op::{Encoding, GoalStatus, Incoming, Op, OpError, Served, Verbosity};
 use crate::protocol::outbox::Throttle;
-use crate::protocol::ros::rosapi::{Census, ListedTopic};
+use crate::protocol::ros::rosapi::{Census, Listed};
 use crate::protocol::wire::json::Payload;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -342,8 +342,8 @@ impl Topics {
     }
 
     /// The topics in the form of rosapi.
-    pub(super) fn listed(&self) -> impl Iterator<Item = ListedTopic> {
-        self.by_name.iter().map(|(name, users)| ListedTopic {
+    pub(super) fn listed(&self) -> impl Iterator<Item = Listed> {
+        self.by_name.iter().map(|(name, users)| Listed {
             name: Arc::clone(name),
             type_name: users.type_name.clone(),
             published: users.publishers > 0,

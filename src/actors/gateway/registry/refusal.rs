@@ -20,8 +20,6 @@ pub(crate) enum Refusal {
         "compression: cbor-raw needs a message type that this runtime knows; give it as type, or subscribe with cbor"
     )]
     UnknownType,
-    #[error("id: a subscription's id has at most {0} bytes")]
-    LongSubscriptionId(usize),
     #[error("{noun}: {1} belongs to the runtime itself", noun = .0.noun())]
     OfRuntime(Served, String),
     #[error("{noun}: this connection does not serve {1}", noun = .0.noun())]
