@@ -142,9 +142,13 @@ impl<W: Write> McapWriter<W> {
         match &entry.content {
             Content::Published { topic, frame } => {
                 let frame: PublishFrame = serde_json::from_slice(frame)?;
-                self.message(at, topic, frame.msg.get())
+                let Some(one) = types::find(topic.type_name()) else {
+                    return Ok(());
+                };
+                let data = cdr::encode_within(one, frame.msg, usize::MAX);
+                let bad_text = || serde_json::Error::custom("a string is not valid text");
+                self.put(at, topic.name(), one, &data.ok_or_else(bad_text)?)
             }
-            Content::NodeMessage { topic, msg } => self.message(at, topic, msg),
             Content::Called {
                 client,
                 service,
@@ -210,16 +214,6 @@ impl<W: Write> McapWriter<W> {
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
-    }
-
-    fn message(&mut self, at: u64, topic: &Topic, msg: &str) -> Result<(), RecordError> {
-        let Some(one) = types::find(topic.type_name()) else {
-            return Ok(());
-        };
-        let msg: &RawValue = serde_json::from_str(msg)?;
-        let data = cdr::encode_within(one, msg, usize::MAX);
-        let data = data.ok_or_else(|| serde_json::Error::custom("a string is not valid text"))?;
-        self.put(at, topic.name(), one, &data)
     }
 
     fn put(

@@ -477,10 +477,8 @@ pub struct TakeCensus;
 
 /// A message or call in the registry, as the tap gets it.
 pub enum Tapped<'a> {
-    /// A message of the runtime, as the whole `publish` frame.
+    /// A message on a topic of the runtime, from a node or a client, as the whole `publish` frame.
     Published(Topic, &'a Bytes),
-    /// A client's message on a topic to which the runtime subscribes.
-    NodeMessage(Topic, &'a Payload),
     /// A client's call of one of the runtime's services.
     Called {
         /// The client.

@@ -275,7 +275,8 @@ impl Registry {
         let (done, ended) = guard();
         self.encode_aside(delivered.long, &done, ctx);
         if let Some(tap) = &mut self.tap {
-            tap(Tapped::NodeMessage(topic, &msg));
+            let frame = messages::publish_raw(topic.name(), &msg);
+            tap(Tapped::Published(topic, &frame));
         }
         listener(TopicMessage {
             msg,
