@@ -4,7 +4,7 @@
 
 use crate::json::Json;
 
-/// Reads bytes that are one value in definite lengths and shortest heads; `None` for anything else.
+/// Reads bytes that are one value in shortest heads; `None` for anything else.
 #[must_use]
 pub fn read(bytes: &[u8]) -> Option<Json> {
     let mut reading = Reading(bytes);
@@ -56,6 +56,9 @@ impl Reading<'_> {
                 _ => None,
             };
         }
+        if head & 31 == 31 {
+            return self.marked(head);
+        }
         let argument = self.argument(head & 31)?;
         let count = usize::try_from(argument).ok()?;
         match head >> 5 {
@@ -81,6 +84,24 @@ impl Reading<'_> {
                 .map(Json::Object),
             _ => self.typed_array(argument),
         }
+    }
+
+    /// An array or an object with a mark at its end.
+    fn marked(&mut self, head: u8) -> Option<Json> {
+        let (mut entries, mut members) = (Vec::new(), Vec::new());
+        while *self.0.first()? != 0xff {
+            match head >> 5 {
+                4 => entries.push(self.value()?),
+                5 => members.push(self.member()?),
+                _ => return None,
+            }
+        }
+        self.take(1)?;
+        Some(if head >> 5 == 4 {
+            Json::Array(entries)
+        } else {
+            Json::Object(members)
+        })
     }
 
     fn text(&mut self, count: usize) -> Option<String> {

@@ -8,9 +8,9 @@
 //!                            └──────────────────────────────┘ └──────────────────────────────────────── nodes
 //! ```
 //!
-//! There is a connection for each client, and one of every other actor. The nodes are `arm_sim` on its own thread,
-//! `ik_action`, `ik_trial`, `follow`, `rosapi`, `rosout`, `tf_web` and `recorder`. The pool of workers does the work
-//! of `study`.
+//! The listener is a task for each socket. There is a connection for each client, and one of every other actor. The
+//! nodes are `arm_sim` on its own thread, `ik_action`, `ik_trial`, `follow`, `rosapi`, `rosout`, `tf_web` and
+//! `recorder`. The pool of workers does the work of `study`.
 //!
 //! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, through the question's reader, or
 //! from another node. The [`node::Reply`] is the way back.

@@ -7,6 +7,7 @@
 //! unanswered sends an error.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -242,22 +243,38 @@ pub enum FrameKind {
     Feedback,
 }
 
-impl Respond {
-    /// An error status with the reason. `id` is that of the faulty frame.
+/// A client, and the way back to it.
+#[derive(Clone)]
+pub struct ClientLink {
+    /// The way back.
+    pub registry: Recipient<Respond>,
+    /// The connection.
+    pub connection: ConnectionId,
+    /// Set when the client has disconnected.
+    pub gone: Arc<AtomicBool>,
+}
+
+impl ClientLink {
+    /// Whether the client has disconnected.
     #[must_use]
-    pub fn error(connection: ConnectionId, why: &str, id: Option<&Payload>) -> Self {
-        Self::status(connection, Level::Error, why, id)
+    pub fn is_gone(&self) -> bool {
+        self.gone.load(Ordering::Relaxed)
     }
 
-    /// A status of this level. `id` is that of its frame.
-    #[must_use]
-    pub fn status(connection: ConnectionId, level: Level, msg: &str, id: Option<&Payload>) -> Self {
-        Self {
-            connection,
-            frame: messages::status(level, msg, id),
-            kind: FrameKind::Status(level),
-            done: None,
-        }
+    /// Sends a status with the reason why the frame with this `id` has no effect, or none yet.
+    pub fn status(&self, level: Level, why: &str, id: Option<&Payload>) {
+        let frame = messages::status(level, why, id);
+        self.send(FrameKind::Status(level), frame, None);
+    }
+
+    /// Sends a frame. `done` is dropped once it is sent.
+    pub fn send(&self, kind: FrameKind, frame: Bytes, done: Option<Done>) {
+        self.registry.do_send(Respond {
+            connection: self.connection,
+            frame,
+            kind,
+            done,
+        });
     }
 }
 

@@ -21,7 +21,7 @@ use crate::actors::arm::sim::ArmSim;
 use crate::actors::compute::workers::WorkerPool;
 use crate::actors::gateway::connection::admission::{Admission, Slots};
 use crate::actors::gateway::files;
-use crate::actors::gateway::listener::{self, Listener, StopListening};
+use crate::actors::gateway::listener;
 use crate::actors::gateway::registry::{Attach, FinishAll, RefuseCalls, Registry};
 use crate::actors::node::ShutDown;
 use crate::actors::nodes;
@@ -144,20 +144,23 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     ends.record(options).await?;
 
     let admission = Arc::new(admission(options, room.newcomers));
-    let listeners: Vec<Addr<Listener>> = sockets
-        .into_iter()
-        .map(|socket| {
-            let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
-            Listener::with(Arc::clone(&admission), socket, registry, gauges).start()
-        })
-        .collect();
+    let listen = |socket| {
+        let (admission, gauges) = (Arc::clone(&admission), Arc::clone(&gauges));
+        actix_rt::spawn(listener::accept(
+            socket,
+            admission,
+            registry.clone(),
+            gauges,
+        ))
+    };
+    let listeners: Vec<_> = sockets.into_iter().map(listen).collect();
     announce(address);
     #[cfg(feature = "web")]
     announce_page(address, options.token.is_some());
     let _ = (&mut signals.came).await;
 
     for listener in listeners {
-        listener.do_send(StopListening);
+        listener.abort();
     }
     shut_down(&registry, &ends.busy, &workers, &gauges).await;
     #[cfg(feature = "record")]

@@ -35,19 +35,12 @@ pub struct RecordEntry {
 /// The kinds of entries.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Content {
-    /// A message of the runtime.
+    /// A message on a topic of the runtime.
     Published {
         /// The topic.
         topic: Topic,
         /// The whole `publish` frame, as a client gets it.
         frame: Bytes,
-    },
-    /// A client's message to the runtime.
-    NodeMessage {
-        /// The topic.
-        topic: Topic,
-        /// The message, in JSON.
-        msg: Box<str>,
     },
     /// A client's call of one of the runtime's services.
     Called {
@@ -95,7 +88,6 @@ impl Content {
     pub fn allocated(&self) -> usize {
         let text = match self {
             Self::Published { frame, .. } | Self::Answered { frame, .. } => frame.len(),
-            Self::NodeMessage { msg, .. } => msg.len(),
             Self::Called { id, args, .. } => id.len() + args.len(),
             Self::Input { note, .. } => note.len(),
             Self::State { position, .. } => 3 * size_of_val(position.as_slice()),

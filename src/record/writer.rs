@@ -9,6 +9,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions, Writer};
 use serde::Deserialize;
+use serde::de::Error as _;
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
@@ -18,7 +19,6 @@ use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::ros::cdr;
 use crate::protocol::ros::rosapi::DISTRO;
-use crate::protocol::ros::tree::MessageTree;
 
 /// Length at which a chunk is written without waiting for the next second.
 pub const CHUNK_BYTES: u64 = 64 * 1024;
@@ -142,9 +142,13 @@ impl<W: Write> McapWriter<W> {
         match &entry.content {
             Content::Published { topic, frame } => {
                 let frame: PublishFrame = serde_json::from_slice(frame)?;
-                self.message(at, topic, frame.msg.get())
+                let Some(one) = types::find(topic.type_name()) else {
+                    return Ok(());
+                };
+                let data = cdr::encode_within(one, frame.msg, usize::MAX);
+                let bad_text = || serde_json::Error::custom("a string is not valid text");
+                self.put(at, topic.name(), one, &data.ok_or_else(bad_text)?)
             }
-            Content::NodeMessage { topic, msg } => self.message(at, topic, msg),
             Content::Called {
                 client,
                 service,
@@ -210,14 +214,6 @@ impl<W: Write> McapWriter<W> {
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
-    }
-
-    fn message(&mut self, at: u64, topic: &Topic, msg: &str) -> Result<(), RecordError> {
-        let Some(one) = types::find(topic.type_name()) else {
-            return Ok(());
-        };
-        let msg = MessageTree::read(msg.as_bytes())?;
-        self.put(at, topic.name(), one, &cdr::encode_tree(one, &msg))
     }
 
     fn put(

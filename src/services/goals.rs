@@ -4,14 +4,14 @@
 //! the target and the setpoint with which it was accepted.
 
 use bytes::Bytes;
-use serde_json::json;
+use serde_json::{Value, json};
 
+use super::arm::joint_names;
 use super::{Address, Answered, Ask, Callable};
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::{Target, Unreachable};
-use crate::protocol::catalog::{Node, Service};
-use crate::protocol::messages::Empty;
-use crate::protocol::messages::goal::{IkFeedback, IkResult, TargetMessage};
+use crate::protocol::catalog::Service;
+use crate::protocol::messages::{Empty, Stamp};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
@@ -58,13 +58,13 @@ fn read_target<const N: usize>(fields: &mut Fields<'_>) -> Option<Target> {
     })
 }
 
-/// A target in the form of the messages.
+/// A target in the form of the messages. It has an orientation only if one was requested.
 #[must_use]
-pub fn target_message(target: &Target) -> TargetMessage {
-    TargetMessage {
-        x: target.position.x,
-        y: target.position.y,
-        phi: target.orientation,
+pub fn target_message(target: &Target) -> Value {
+    let (x, y) = target.position.into();
+    match target.orientation {
+        Some(phi) => json!({"x": x, "y": y, "phi": phi}),
+        None => json!({"x": x, "y": y}),
     }
 }
 
@@ -80,7 +80,7 @@ pub struct GoalRequest<const N: usize> {
 }
 
 impl<const N: usize> Ask for GoalRequest<N> {
-    type Answer = Result<String, GoalRejected>;
+    type Answer = Result<String, Unreachable>;
 }
 
 impl<const N: usize> Callable for GoalRequest<N> {
@@ -104,20 +104,9 @@ impl<const N: usize> Callable for GoalRequest<N> {
 }
 
 impl<const N: usize> Answered for GoalRequest<N> {
-    fn write(answer: Result<String, GoalRejected>, to: &Address) -> Bytes {
+    fn write(answer: Result<String, Unreachable>, to: &Address) -> Bytes {
         to.outcome(answer.map(|goal_id| json!({"goal_id": goal_id})))
     }
-}
-
-/// Why a goal was not accepted. Nothing has changed.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum GoalRejected {
-    /// There is no solution.
-    #[error(transparent)]
-    Unsolved(#[from] Unreachable),
-    /// The arm's actor has ended.
-    #[error("{} does not answer", Node::ArmSim.name())]
-    NoAnswer,
 }
 
 /// Preempts a goal if it is the active one. Answered after its result has been published.
@@ -160,12 +149,6 @@ pub enum CancelRejected {
         /// The active goal.
         active: String,
     },
-    /// The client has not sent the active goal under this id.
-    #[error("{NOT_ACTIVE}")]
-    NotSent,
-    /// The arm's actor has ended.
-    #[error("{} does not answer", Node::ArmSim.name())]
-    NoAnswer,
 }
 
 /// An accepted goal.
@@ -193,26 +176,43 @@ impl<const N: usize> AcceptedGoal<N> {
         }
     }
 
-    /// Its feedback message, from the remaining distance \[m\] and the simulation time since its start \[s\].
+    /// Its message on `/ik_action/feedback`, from the remaining distance \[m\] and the simulation time since its start
+    /// \[s\].
     #[must_use]
-    pub fn feedback(&self, distance: f64, elapsed: f64) -> IkFeedback {
-        IkFeedback {
-            goal_id: self.id.clone(),
-            target: target_message(&self.target),
-            positions: self.positions.to_vec(),
-            distance_remaining: distance,
-            elapsed,
-        }
+    pub fn feedback(&self, distance: f64, elapsed: f64) -> Value {
+        json!({
+            "goal_id": self.id,
+            "target": target_message(&self.target),
+            "positions": self.positions.as_slice(),
+            "distance_remaining": distance,
+            "elapsed": elapsed,
+        })
     }
 
-    /// Its result message.
+    /// Its message on `/ik_action/result`.
     #[must_use]
-    pub fn result(&self, distance: f64, outcome: Option<Outcome>) -> IkResult {
-        IkResult {
-            goal_id: self.id.clone(),
-            outcome: outcome.map_or("", Outcome::name),
-            target: target_message(&self.target),
-            final_distance: distance,
-        }
+    pub fn result(&self, distance: f64, outcome: Option<Outcome>) -> Value {
+        json!({
+            "goal_id": self.id,
+            "outcome": outcome.map_or("", Outcome::name),
+            "target": target_message(&self.target),
+            "final_distance": distance,
+        })
+    }
+
+    /// Its setpoint as a `trajectory_msgs/msg/JointTrajectory` of one point, at rest, as soon as possible.
+    #[must_use]
+    pub fn trajectory(&self) -> Value {
+        let now = Stamp::default();
+        json!({
+            "header": {"stamp": now, "frame_id": ""},
+            "joint_names": joint_names::<N>().as_slice(),
+            "points": [{
+                "positions": self.positions.as_slice(),
+                "velocities": vec![0.0; N],
+                "accelerations": [],
+                "time_from_start": now,
+            }],
+        })
     }
 }

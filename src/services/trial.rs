@@ -5,14 +5,13 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::goals::target_message;
 use super::{Address, Answered, Ask, Callable};
 use crate::math::trial::{Changes, Rejection, Settings, Status};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::Empty;
-use crate::protocol::messages::goal::TrialStatus;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
@@ -98,17 +97,17 @@ impl Answered for TrialRequest {
     }
 }
 
-/// The status in the form of its message.
+/// The message of `/ik_trial/status`.
 #[must_use]
-pub fn status_message(status: &Status) -> TrialStatus {
-    TrialStatus {
-        running: status.running,
-        elapsed: status.elapsed,
-        duration: status.duration,
-        targets_reached: status.targets_reached,
-        target: status.target.as_ref().map(target_message),
-        error: status.error,
-        desired_positions: status.desired_positions.clone(),
-        action_status: status.action_status.name(),
-    }
+pub fn status_message(status: &Status) -> Value {
+    json!({
+        "running": status.running,
+        "elapsed": status.elapsed,
+        "duration": status.duration,
+        "targets_reached": status.targets_reached,
+        "target": status.target.as_ref().map(target_message),
+        "error": status.error,
+        "desired_positions": status.desired_positions,
+        "action_status": status.action_status.name(),
+    })
 }

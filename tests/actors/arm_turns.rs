@@ -121,7 +121,7 @@ impl TurnsBench {
     }
 
     async fn steps_taken(&self) -> u64 {
-        self.arm.send(TakeSnapshot).await.unwrap().0.steps()
+        self.arm.send(TakeSnapshot).await.unwrap().steps()
     }
 }
 

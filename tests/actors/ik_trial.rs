@@ -11,9 +11,7 @@ use crate::stage::{
 };
 use crate::system::{counting_wake_ups, in_virtual_time};
 use actix::prelude::*;
-use pendularm::actors::arm::ik_action::{
-    CancelRejected, CancelRequest, GoalRejected, GoalReport, SendGoal,
-};
+use pendularm::actors::arm::ik_action::{CancelRejected, CancelRequest, GoalReport, SendGoal};
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, TrialRequest};
 use pendularm::actors::arm::sim::{ArmPose, GoalProgress, Pose};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
@@ -65,11 +63,11 @@ struct Script {
 
 impl Script {
     /// The answer of `ik_action` to a goal.
-    fn accept(&mut self, goal: SendGoal<2>) -> Result<String, GoalRejected> {
+    fn accept(&mut self, goal: SendGoal<2>) -> Result<String, Unreachable> {
         self.sent.push(goal.goal.target);
         if self.refusals > 0 {
             self.refusals -= 1;
-            return Err(GoalRejected::Unsolved(Unreachable::NotFinite("x")));
+            return Err(Unreachable::NotFinite("x"));
         }
         self.owner = Some(goal.owner);
         Ok(format!("goal-{}", self.sent.len()))

@@ -7,18 +7,20 @@ use std::sync::Arc;
 
 use crate::system::in_real_time;
 use actix::prelude::*;
-use pendularm::actors::gateway::listener::{Listener, StopListening, bind};
+use pendularm::actors::gateway::listener::{accept, bind};
 use pendularm::actors::gateway::registry::Registry;
 use pendularm::actors::resources::gauges::Gauges;
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
+use tokio::task::JoinHandle;
 
-fn listen() -> (Addr<Listener>, SocketAddr) {
+fn listen() -> (JoinHandle<()>, SocketAddr) {
     let socket = bind("127.0.0.1:0".parse().unwrap()).unwrap();
     let address = socket.local_addr().unwrap();
     let gauges = Arc::new(Gauges::default());
     let registry = Registry::new(Arc::clone(&gauges)).start();
-    (Listener::new(socket, registry, gauges).start(), address)
+    let listening = accept(socket, Arc::default(), registry, gauges);
+    (actix_rt::spawn(listening), address)
 }
 
 async fn exchange(stream: &mut BufReader<TcpStream>) {
@@ -42,10 +44,8 @@ fn accepted_clients_outlive_the_listening() {
             exchange(&mut client).await;
             clients.push(client);
         }
-        listener.send(StopListening).await.unwrap();
-        while listener.connected() {
-            tokio::task::yield_now().await;
-        }
+        listener.abort();
+        assert!(listener.await.unwrap_err().is_cancelled());
         for client in &mut clients {
             exchange(client).await;
         }

@@ -21,7 +21,7 @@ const STEP: &str = "/arm_sim/integration_step";
 /// `limits.rs` asserts that the sum is within the limit.
 #[test]
 fn places_and_pools_have_the_documented_sizes() {
-    const { assert!(CLIENT_BYTES == 1728 * 1024 && MAX_MEMORY == 752 * MIB) };
+    const { assert!(CLIENT_BYTES == 1728 * 1024 && MAX_MEMORY == 624 * MIB) };
     const { assert!(LONG_FRAMES == 3 && LONG_ANSWERS == 96 * MIB && SHORT == 64 * 1024) };
 }
 

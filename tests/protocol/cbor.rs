@@ -4,17 +4,17 @@
 //! back.
 
 use pendularm::protocol::ros::cbor;
-use pendularm::protocol::ros::tree::MessageTree;
+use serde_json::value::{RawValue, to_raw_value};
 use serde_json::{Value, json};
 
 fn publish(topic: &str, type_name: Option<&str>, msg: &Value) -> Vec<u8> {
-    let tree = MessageTree::from(msg);
-    cbor::publish(topic, type_name, &tree, usize::MAX).expect("room")
+    let msg = to_raw_value(msg).unwrap();
+    cbor::publish(topic, type_name, &msg, usize::MAX).expect("room")
 }
 
 fn publish_raw(topic: &str, type_name: &str, msg: &Value) -> Option<Vec<u8>> {
-    let tree = MessageTree::from(msg);
-    cbor::publish_raw(topic, type_name, &tree, usize::MAX)
+    let msg = to_raw_value(msg).unwrap();
+    cbor::publish_raw(topic, type_name, &msg, usize::MAX)
 }
 
 /// A row: type, message, and the bytes of the message. They are hexadecimal; `"text"` is a CBOR text, `f(1.5)` for a
@@ -78,12 +78,12 @@ fn every_message_has_the_bytes_of_its_row() {
 }
 
 #[test]
-fn long_text_and_long_lists_have_their_length_in_the_bytes_behind_the_first() {
+fn long_text_has_its_length_in_the_bytes_behind_the_first_and_a_list_a_mark_at_its_end() {
     let behind_head = |msg: Value| publish("/t", None, &msg).split_off(head().len());
     let long = "x".repeat(300);
     let expected = [&[0x79, 0x01, 0x2c], long.as_bytes()].concat();
     assert_eq!(behind_head(json!(long)), expected);
-    let expected = [&[0x98, 24][..], &[0x00; 24]].concat();
+    let expected = [&[0x9f][..], &[0x00; 24], &[0xff]].concat();
     assert_eq!(behind_head(json!(vec![0; 24])), expected);
 }
 
@@ -106,16 +106,16 @@ fn a_frame_that_would_be_longer_than_it_may_be_is_not_made() {
     let type_name = "tf2_msgs/msg/TFMessage";
     let long = publish_raw("/t", type_name, &transforms).unwrap();
     assert!(long.len() > 8_000, "{}", long.len());
-    let tree = MessageTree::from(&transforms);
+    let msg = to_raw_value(&transforms).unwrap();
     for (missing, made) in [(0, Some(&long)), (1, None), (long.len(), None)] {
         let most = long.len() - missing;
-        let raw = cbor::publish_raw("/t", type_name, &tree, most);
+        let raw = cbor::publish_raw("/t", type_name, &msg, most);
         assert_eq!(raw.as_ref(), made, "{missing}");
     }
     let short = publish("/t", None, &transforms);
     for (missing, made) in [(0, Some(&short)), (1, None)] {
         let most = short.len() - missing;
-        let untyped = cbor::publish("/t", None, &tree, most);
+        let untyped = cbor::publish("/t", None, &msg, most);
         assert_eq!(untyped.as_ref(), made, "{missing}");
     }
 }
@@ -155,4 +155,38 @@ fn stamps_and_durations_are_read_under_their_names_of_ros_1_too() {
         let cbor = publish("/t", Some(type_name), &ros2);
         assert_eq!(publish("/t", Some(type_name), &ros1), cbor, "{type_name}");
     }
+}
+
+/// A message in JSON text, as CBOR of a known type, as CBOR of no known type, and as CDR.
+fn encodings(type_name: &str, text: &str) -> [Option<Vec<u8>>; 3] {
+    let msg: &RawValue = serde_json::from_str(text).unwrap();
+    [
+        cbor::publish("/t", Some(type_name), msg, usize::MAX),
+        cbor::publish("/t", None, msg, usize::MAX),
+        cbor::publish_raw("/t", type_name, msg, usize::MAX),
+    ]
+}
+
+#[test]
+fn a_string_with_half_of_a_surrogate_pair_has_no_encoding() {
+    let half = encodings("std_msgs/String", r#"{"data":"\ud800"}"#);
+    assert_eq!(half, [None, None, None]);
+    let whole = encodings("std_msgs/String", r#"{"data":"\ud83d\ude00"}"#);
+    assert!(whole.iter().all(Option::is_some));
+}
+
+#[test]
+fn of_a_repeated_name_the_last_member_counts() {
+    let [once, _, once_raw] = encodings("std_msgs/String", r#"{"data":"b"}"#);
+    let [twice, _, twice_raw] = encodings("std_msgs/String", r#"{"data":"a","data":"b"}"#);
+    assert_eq!((twice, twice_raw), (once, once_raw));
+}
+
+/// A frame has at most 128 levels, and its message one fewer.
+#[test]
+fn a_message_may_be_nested_as_deep_as_a_frame() {
+    let nested = "[".repeat(127) + &"]".repeat(127);
+    let [_, frame, _] = encodings("std_msgs/String", &nested);
+    let expected = [head(), vec![0x9f; 127], vec![0xff; 127]].concat();
+    assert_eq!(frame, Some(expected));
 }

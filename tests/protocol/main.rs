@@ -13,6 +13,5 @@ mod rosapi;
 mod scene;
 mod series;
 mod trajectory;
-mod tree;
 #[cfg(feature = "web")]
 mod websocket;

@@ -11,8 +11,7 @@ use crate::nodes::start_whole;
 use actix::prelude::*;
 use pendularm::actors::arm::ik_action::GoalTracker;
 use pendularm::actors::arm::sim::{
-    ArmPose, ArmSim, Pose, Reset, SetParams, SetSetpoint, Snapshot, TakeSnapshot, TrackGoal,
-    Tracking,
+    ArmPose, ArmSim, Pose, Reset, SetParams, SetSetpoint, TakeSnapshot, TrackGoal, Tracking,
 };
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::connection::Connection;
@@ -69,7 +68,7 @@ impl<const N: usize> Stage<N> {
 
     /// The present state of the arm's whole simulation.
     pub async fn simulation(&self) -> Simulation<N> {
-        let Snapshot(simulation) = self.arm.send(TakeSnapshot).await.unwrap();
+        let simulation = self.arm.send(TakeSnapshot).await.unwrap();
         *simulation
     }
 

@@ -13,18 +13,18 @@ use actix::prelude::*;
 use serde::Serialize;
 
 use crate::actors::arm::sim::{
-    ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal, Tracking, joint_names,
+    ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal, Tracking,
 };
 use crate::actors::node::{Ask, Asker, Barrier, Call, Done, Publish, Reply, ShutDown, Unserved};
-use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal, Goal, SentGoal};
+use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal, Goal};
 use crate::actors::wire::{Callable, Nodes};
 use crate::math::goal::Outcome;
+use crate::math::kinematics::Unreachable;
 use crate::protocol::catalog::{Action, Service, Topic};
-use crate::protocol::messages::goal::setpoint_trajectory;
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::op::{Arguments, GoalStatus};
-use crate::services::goals::AcceptedGoal;
-pub use crate::services::goals::{CancelRejected, CancelRequest, GoalRejected, GoalRequest};
+use crate::services::goals::{AcceptedGoal, NOT_ACTIVE};
+pub use crate::services::goals::{CancelRejected, CancelRequest, GoalRequest};
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -52,16 +52,6 @@ enum GoalOwner<const N: usize> {
     Node(Recipient<GoalReport<N>>),
     /// A client that sent it by the action.
     Client(Arc<ActionClient>),
-}
-
-/// The identification of a goal to be ended.
-enum GoalSelector {
-    /// The active goal.
-    Active,
-    /// The goal with this id, from the answer to its sender.
-    ById(String),
-    /// The goal of this client, sent by the action.
-    Sent(SentGoal),
 }
 
 /// The messages to the arm for goals.
@@ -118,7 +108,7 @@ pub struct SendGoal<const N: usize> {
 }
 
 impl<const N: usize> Ask for SendGoal<N> {
-    type Answer = Result<String, GoalRejected>;
+    type Answer = Result<String, Unreachable>;
 }
 
 /// The progress of a goal, for the owner in its [`SendGoal`].
@@ -142,10 +132,10 @@ impl<const N: usize> Goal for GoalRequest<N> {
 /// A client that has sent a goal by the action. Feedback shows that it was accepted.
 struct GoalSender(Arc<ActionClient>);
 
-impl Asker<Result<String, GoalRejected>> for GoalSender {
+impl Asker<Result<String, Unreachable>> for GoalSender {
     fn answer(
         self: Box<Self>,
-        answer: Result<Result<String, GoalRejected>, Unserved>,
+        answer: Result<Result<String, Unreachable>, Unserved>,
         _: Option<Done>,
     ) {
         match answer {
@@ -200,14 +190,15 @@ impl<const N: usize> Handler<CancelSent> for IkAction<N> {
 
     /// The client is informed if that goal is not active. Otherwise the goal's result is the answer.
     fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
-        let goal = GoalSelector::Sent(cancel.goal.clone());
-        let cancellation = self.end(&goal, GoalStatus::Canceled);
-        ctx.wait(cancellation.map(move |outcome, _, _| {
-            if let Err(why @ CancelRejected::NotSent) = outcome {
-                cancel.refuse(&why.to_string());
-            }
-            drop(cancel.done);
-        }));
+        let is_meant = |goal: &&ActiveGoal<N>| match &goal.owner {
+            Some(GoalOwner::Client(client)) => cancel.is_of(client),
+            _ => false,
+        };
+        let Some(goal) = self.active.as_ref().filter(is_meant) else {
+            return cancel.refuse(NOT_ACTIVE);
+        };
+        let ended = self.end(goal.goal.number, GoalStatus::Canceled);
+        ctx.wait(ended.map(move |_, _, _| drop(cancel.done)));
     }
 }
 
@@ -215,13 +206,16 @@ impl<const N: usize> Handler<Call<CancelRequest>> for IkAction<N> {
     type Result = ();
 
     fn handle(&mut self, call: Call<CancelRequest>, ctx: &mut Context<Self>) {
-        let mut reply = call.reply;
-        let goal = call
-            .ask
-            .goal_id
-            .map_or(GoalSelector::Active, GoalSelector::ById);
-        let cancellation = self.end(&goal, GoalStatus::Canceled);
-        ctx.wait(cancellation.map(move |outcome, _, _| reply.answer(outcome)));
+        let Call { ask, mut reply } = call;
+        let Some(ActiveGoal { goal, .. }) = &self.active else {
+            return reply.answer(Err(CancelRejected::NotActive));
+        };
+        if ask.goal_id.is_some_and(|id| id != goal.id) {
+            let active = goal.id.clone();
+            return reply.answer(Err(CancelRejected::OtherGoal { active }));
+        }
+        let ended = self.end(goal.number, GoalStatus::Canceled);
+        ctx.wait(ended.map(move |ended, _, _| reply.answer(ended)));
     }
 }
 
@@ -229,8 +223,13 @@ impl<const N: usize> Handler<ShutDown> for IkAction<N> {
     type Result = ResponseActFuture<Self, ()>;
 
     fn handle(&mut self, _: ShutDown, _: &mut Context<Self>) -> Self::Result {
-        let end = self.end(&GoalSelector::Active, GoalStatus::Aborted);
-        Box::pin(end.map(|_, _, _| ()))
+        match &self.active {
+            Some(goal) => {
+                let ended = self.end(goal.goal.number, GoalStatus::Aborted);
+                Box::pin(ended.map(|_, _, _| ()))
+            }
+            None => Box::pin(actix::fut::ready(())),
+        }
     }
 }
 
@@ -263,21 +262,6 @@ impl<const N: usize> ActiveGoal<N> {
         self.goal.number == progress.number
     }
 
-    /// Whether this goal has the given id.
-    fn check(&self, selector: &GoalSelector) -> Result<(), CancelRejected> {
-        match (selector, &self.owner) {
-            (GoalSelector::Active, _) => Ok(()),
-            (GoalSelector::ById(id), _) if *id == self.goal.id => Ok(()),
-            (GoalSelector::ById(_), _) => Err(CancelRejected::OtherGoal {
-                active: self.goal.id.clone(),
-            }),
-            (GoalSelector::Sent(goal), Some(GoalOwner::Client(client))) if client.is(goal) => {
-                Ok(())
-            }
-            (GoalSelector::Sent(_), _) => Err(CancelRejected::NotSent),
-        }
-    }
-
     /// Informs its owner of feedback or of its end.
     fn inform_owner(&self, progress: &GoalProgress<N>) {
         match &self.owner {
@@ -307,7 +291,7 @@ impl<const N: usize> IkAction<N> {
         &mut self,
         goal: GoalRequest<N>,
         owner: Option<GoalOwner<N>>,
-        mut reply: Reply<Result<String, GoalRejected>>,
+        mut reply: Reply<Result<String, Unreachable>>,
         ctx: &mut Context<Self>,
     ) {
         let GoalRequest { target, criteria } = goal;
@@ -321,9 +305,8 @@ impl<const N: usize> IkAction<N> {
             owner: ctx.address().recipient(),
         });
         ctx.wait(begun.into_actor(self).map(move |tracking, node, _| {
-            let tracking = match tracking {
-                Ok(tracking) => tracking.map_err(GoalRejected::from),
-                Err(_) => Err(GoalRejected::NoAnswer),
+            let Ok(tracking) = tracking else {
+                return reply.refuse(Unserved::NO_ARM);
             };
             let is_accepted = tracking.is_ok();
             if let Ok(Some(obstacle)) = tracking.as_ref().map(|tracking| tracking.obstacle) {
@@ -363,32 +346,22 @@ impl<const N: usize> IkAction<N> {
         let Some(goal) = &self.active else {
             return;
         };
-        let (number, positions) = (goal.goal.number, goal.goal.positions);
-        let trajectory = move || setpoint_trajectory(&joint_names::<N>(), &positions);
-        self.publish(Topic::JointTrajectory, trajectory);
+        let goal = goal.goal.clone();
+        let (number, positions) = (goal.number, goal.positions);
+        self.publish(Topic::JointTrajectory, move || goal.trajectory());
         self.arm.command.do_send(CommandGoal { number, positions });
     }
 
-    /// Preempts the active goal if it has the given id and the arm has not reached it yet. Its client gets that
-    /// `status`.
+    /// Preempts the active goal, unless the arm has reached it already. Its client gets that `status`.
     fn end(
         &self,
-        selector: &GoalSelector,
+        number: u64,
         status: GoalStatus,
-    ) -> ResponseActFuture<Self, Result<(), CancelRejected>> {
-        let number = match (&self.active, selector) {
-            (None, GoalSelector::Sent(_)) => Err(CancelRejected::NotSent),
-            (None, _) => Err(CancelRejected::NotActive),
-            (Some(goal), _) => goal.check(selector).map(|()| goal.goal.number),
-        };
-        let arm = self.arm.end.clone();
-        let ended = async move {
-            let number = number?;
-            let ended = arm.send(EndGoal { number }).await;
-            ended.map_err(|_| CancelRejected::NoAnswer)
-        };
-        Box::pin(ended.into_actor(self).map(move |ended, node, _| {
-            let ended = ended?.ok_or(CancelRejected::NotActive)?;
+    ) -> impl ActorFuture<Self, Output = Result<(), CancelRejected>> + use<N> {
+        let ended = self.arm.end.send(EndGoal { number }).into_actor(self);
+        ended.map(move |ended, node, _| {
+            // An arm that has ended has no goal.
+            let ended = ended.ok().flatten().ok_or(CancelRejected::NotActive)?;
             if let Some(goal) = &mut node.active {
                 goal.if_preempted = status;
             }
@@ -397,7 +370,7 @@ impl<const N: usize> IkAction<N> {
                 Some(Outcome::Preempted) => Ok(()),
                 _ => Err(CancelRejected::NotActive),
             }
-        }))
+        })
     }
 
     /// Publishes the result of the goal and removes it. Does nothing if another goal is active.

@@ -5,7 +5,6 @@
 
 use std::time::Duration;
 
-use crate::actors::resources::long_work::PLACES;
 use crate::actors::resources::memory::{LONG_ANSWERS, LONG_FRAMES, SHORT};
 use crate::protocol::limits::{DEFAULT_CLIENTS, MAX_FRAME, MEDIUM};
 use crate::protocol::outbox::MAX_TOPIC_BYTES;
@@ -14,7 +13,7 @@ const KIB: usize = 1024;
 
 /// Largest resident size of the program with the default number of places \[bytes\]. It excludes the system's socket
 /// buffers.
-pub const MAX_MEMORY: usize = 752 * KIB * KIB;
+pub const MAX_MEMORY: usize = 624 * KIB * KIB;
 /// Most bytes of one client, without long frames and answers. The sum has its input (received bytes and a frame),
 /// the pieces of a message, and topic messages that wait or are being written. Responses and computations count with
 /// one more than may wait. The entries of the registry, a WebSocket's buffers and the idle connection are included.
@@ -30,17 +29,10 @@ pub const CLIENT_BYTES: usize = 2 * MEDIUM
 /// Most bytes of a long frame. It exists as received bytes, as a message, as text, as a value, as the forwarded frame,
 /// and as that frame in another form.
 pub const LONG_FRAME_BYTES: usize = 6 * MAX_FRAME;
-/// Most bytes of a long message while it is converted to another encoding
-/// ([`MessageTree`](crate::protocol::ros::tree::MessageTree)).
-const TREE_BYTES: usize = 16 * MAX_FRAME;
 /// Bytes of the program itself.
 const PROGRAM_BYTES: usize = 24 * KIB * KIB;
 const _: () = assert!(
-    DEFAULT_CLIENTS * CLIENT_BYTES
-        + LONG_FRAMES * LONG_FRAME_BYTES
-        + PLACES * TREE_BYTES
-        + LONG_ANSWERS
-        + PROGRAM_BYTES
+    DEFAULT_CLIENTS * CLIENT_BYTES + LONG_FRAMES * LONG_FRAME_BYTES + LONG_ANSWERS + PROGRAM_BYTES
         <= MAX_MEMORY
 );
 

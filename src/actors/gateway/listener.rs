@@ -31,95 +31,35 @@ pub const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(15);
 /// See [`KEEPALIVE_INTERVAL`].
 pub const KEEPALIVE_PROBES: u32 = 4;
 
-// ---- state ----------------------------------------------------------------------------------------------------------
-
-/// The actor that owns one listening socket.
-#[derive(Clone)]
-pub struct Listener {
-    socket: Arc<TcpListener>,
+/// Accepts clients on a bound socket, and starts a connection for each. The runtime aborts it when it ends.
+pub async fn accept(
+    socket: TcpListener,
+    admission: Arc<Admission>,
     registry: Addr<Registry>,
     gauges: Arc<Gauges>,
-    admission: Arc<Admission>,
-}
-
-impl Listener {
-    /// A listener on a bound socket. It requires no token.
-    #[must_use]
-    pub fn new(socket: TcpListener, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Self {
-        Self::with(Arc::default(), socket, registry, gauges)
-    }
-
-    /// A listener that admits clients under these conditions.
-    #[must_use]
-    pub fn with(
-        admission: Arc<Admission>,
-        socket: TcpListener,
-        registry: Addr<Registry>,
-        gauges: Arc<Gauges>,
-    ) -> Self {
-        Self {
-            socket: Arc::new(socket),
-            registry,
-            gauges,
-            admission,
-        }
-    }
-}
-
-// ---- messages -------------------------------------------------------------------------------------------------------
-
-/// No more clients are accepted. From the runtime, when it ends.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct StopListening;
-
-// ---- life cycle -----------------------------------------------------------------------------------------------------
-
-impl Actor for Listener {
-    type Context = Context<Self>;
-
-    fn started(&mut self, ctx: &mut Context<Self>) {
-        ctx.spawn(self.clone().accept().into_actor(self));
-    }
-}
-
-// ---- handlers -------------------------------------------------------------------------------------------------------
-
-impl Handler<StopListening> for Listener {
-    type Result = ();
-
-    fn handle(&mut self, _: StopListening, ctx: &mut Context<Self>) {
-        ctx.stop();
-    }
-}
-
-// ---- helpers --------------------------------------------------------------------------------------------------------
-
-impl Listener {
-    async fn accept(self) {
-        // An error is logged once, not twenty times a second.
-        let mut failing = false;
-        loop {
-            match self.socket.accept().await {
-                Ok((stream, peer)) => {
-                    if std::mem::take(&mut failing) {
-                        tracing::info!("clients are accepted again");
-                    }
-                    if let Err(error) = prepare(&stream) {
-                        tracing::debug!(%peer, %error, "a socket option was refused");
-                    }
-                    tracing::debug!(%peer, "client connected");
-                    let local = stream.local_addr().unwrap_or(Ends::default().local);
-                    let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
-                    let (admission, ends) = (Arc::clone(&self.admission), Ends { local, peer });
-                    Connection::start_with(admission, ends, stream, registry, gauges);
+) {
+    // An error is logged once, not twenty times a second.
+    let mut failing = false;
+    loop {
+        match socket.accept().await {
+            Ok((stream, peer)) => {
+                if std::mem::take(&mut failing) {
+                    tracing::info!("clients are accepted again");
                 }
-                Err(error) => {
-                    if !std::mem::replace(&mut failing, true) {
-                        tracing::warn!(%error, "cannot accept a client; retrying");
-                    }
-                    actix_rt::time::sleep(BACKOFF).await;
+                if let Err(error) = prepare(&stream) {
+                    tracing::debug!(%peer, %error, "a socket option was refused");
                 }
+                tracing::debug!(%peer, "client connected");
+                let local = stream.local_addr().unwrap_or(Ends::default().local);
+                let (admission, ends) = (Arc::clone(&admission), Ends { local, peer });
+                let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
+                Connection::start_with(admission, ends, stream, registry, gauges);
+            }
+            Err(error) => {
+                if !std::mem::replace(&mut failing, true) {
+                    tracing::warn!(%error, "cannot accept a client; retrying");
+                }
+                actix_rt::time::sleep(BACKOFF).await;
             }
         }
     }

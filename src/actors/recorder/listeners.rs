@@ -39,7 +39,6 @@ pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Tap {
     Box::new(move |what| {
         let length = match &what {
             Tapped::Published(_, frame) | Tapped::Answered { frame, .. } => frame.len(),
-            Tapped::NodeMessage(_, msg) => msg.line().len(),
             Tapped::Called { id, args, .. } => {
                 args.line().len() + id.map_or(0, |id| id.line().len())
             }
@@ -51,10 +50,6 @@ pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Tap {
             Tapped::Published(topic, frame) => Content::Published {
                 topic,
                 frame: copied(frame),
-            },
-            Tapped::NodeMessage(topic, msg) => Content::NodeMessage {
-                topic,
-                msg: msg.line().into(),
             },
             Tapped::Called {
                 from,

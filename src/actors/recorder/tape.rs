@@ -266,9 +266,9 @@ mod tests {
     use crate::protocol::catalog::Topic;
 
     fn message(bytes: usize) -> Content {
-        Content::NodeMessage {
+        Content::Published {
             topic: Topic::JointTrajectory,
-            msg: "x".repeat(bytes).into(),
+            frame: "x".repeat(bytes).into(),
         }
     }
 

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
+use serde_json::Value;
 use tokio::time::sleep;
 
 use crate::actors::gateway::registry::TakeCensus;
@@ -16,7 +17,7 @@ use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
-use crate::protocol::ros::rosapi::{self, Census};
+use crate::protocol::ros::rosapi::{UnknownType, answer};
 
 /// Pause between two tries to find room for a long list.
 const ROOM_RETRY: Duration = Duration::from_millis(10);
@@ -56,17 +57,8 @@ pub struct Look {
     pub name: String,
 }
 
-/// A question and the registrations of clients: its answer is made of these and of the catalog.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Listing {
-    /// The question.
-    pub look: Look,
-    /// Topics and services of clients.
-    pub census: Census,
-}
-
 impl Ask for Look {
-    type Answer = Listing;
+    type Answer = Result<Value, UnknownType>;
 }
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
@@ -92,7 +84,7 @@ impl Handler<Call<Look>> for RosapiNode {
             while !reply.reserve(census.most_bytes()) {
                 sleep(ROOM_RETRY).await;
             }
-            let list = move || reply.answer(Listing { look: ask, census });
+            let list = move || reply.answer(answer(ask.question, &ask.name, &census));
             place.perform(list).await;
         };
         ctx.spawn(answered.into_actor(self));
@@ -119,7 +111,7 @@ impl Callable for Look {
 }
 
 impl Answered for Look {
-    fn write(Listing { look, census }: Listing, to: &Address) -> Bytes {
-        to.outcome(rosapi::answer(look.question, &look.name, &census))
+    fn write(answer: Result<Value, UnknownType>, to: &Address) -> Bytes {
+        to.outcome(answer)
     }
 }

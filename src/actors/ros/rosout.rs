@@ -3,6 +3,7 @@
 //! **Invariant:** without subscribers no warning is stored.
 
 use actix::prelude::*;
+use serde_json::json;
 use tokio::sync::mpsc;
 use tracing::Level;
 
@@ -12,7 +13,6 @@ use crate::actors::wire::Nodes;
 use crate::logging::{self, Warning};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::Stamp;
-use crate::protocol::messages::scene::LogMessage;
 
 /// Most warnings that wait to be published. Others are only in the log.
 const MAX_WAITING: usize = 64;
@@ -83,15 +83,18 @@ fn message((metadata, msg): Warning, time: f64) -> Publish {
     // The levels are those of ROS.
     let is_error = *metadata.level() == Level::ERROR;
     let level = if is_error { 40 } else { 30 };
-    Publish::made(Topic::Rosout, move || LogMessage {
-        stamp: Stamp::from_seconds(time),
-        level,
-        name: node_of(metadata.target()),
-        msg,
-        file: metadata.file().unwrap_or_default(),
-        function: "",
-        line: metadata.line().unwrap_or_default(),
-    })
+    let message = move || {
+        json!({
+            "stamp": Stamp::from_seconds(time),
+            "level": level,
+            "name": node_of(metadata.target()),
+            "msg": msg,
+            "file": metadata.file().unwrap_or_default(),
+            "function": "",
+            "line": metadata.line().unwrap_or_default(),
+        })
+    };
+    Publish::made(Topic::Rosout, message)
 }
 
 /// The actor of the reporting module: `registry` for `pendularm::actors::gateway::registry::ops`.

@@ -4,14 +4,11 @@
 //! feedback.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use actix::prelude::*;
-use bytes::Bytes;
 use serde::Serialize;
 
-use crate::actors::ConnectionId;
-use crate::actors::node::{Done, FrameKind, Respond};
+use crate::actors::node::{ClientLink, Done, FrameKind};
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::fields::Rejections;
@@ -50,77 +47,54 @@ pub struct ForwardGoal<G> {
     pub done: Done,
 }
 
-/// Cancels the goal that the same client has sent. From clients, by the action.
+/// Cancels the goal that the same client has sent under this id. From clients, by the action.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct CancelSent {
-    /// The goal. Its client gets an error status if it is not active.
-    pub goal: SentGoal,
-    /// The way back.
-    pub respond: Recipient<Respond>,
+    /// The client. It gets an error status if the goal is not active.
+    pub link: ClientLink,
+    /// The goal's id, if it has one.
+    pub id: Option<Payload>,
     /// Dropped when the goal has ended.
     pub done: Done,
 }
 
-/// A goal of the action: its client and the client's id.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SentGoal {
-    /// The connection.
-    pub connection: ConnectionId,
-    /// The goal's id, if it has one.
-    pub id: Option<Payload>,
-}
-
-/// The client that sent a goal, and its recipients.
+/// The client that sent a goal.
 pub struct ActionClient {
-    /// The way back.
-    pub respond: Recipient<Respond>,
-    /// The connection.
-    pub connection: ConnectionId,
+    /// The client.
+    pub link: ClientLink,
     /// The action's name as the client spells it.
     pub action: Arc<str>,
     /// The goal's id, if it has one.
     pub id: Option<Payload>,
     /// Whether the client gets feedback.
     pub wants_feedback: bool,
-    /// Set when the client has disconnected.
-    pub gone: Arc<AtomicBool>,
 }
 
 impl CancelSent {
+    /// Whether it is about the goal of this client.
+    #[must_use]
+    pub fn is_of(&self, client: &ActionClient) -> bool {
+        self.link.connection == client.link.connection && self.id == client.id
+    }
+
     /// Sends the reason why no goal was cancelled.
     pub fn refuse(&self, why: &str) {
-        let SentGoal { connection, id } = &self.goal;
-        let status = Respond::error(*connection, why, id.as_ref());
-        self.respond.do_send(status);
+        self.link.status(Level::Error, why, self.id.as_ref());
     }
 }
 
 impl ActionClient {
-    /// Whether the client has disconnected.
-    #[must_use]
-    pub fn is_gone(&self) -> bool {
-        self.gone.load(Ordering::Relaxed)
-    }
-
-    /// Whether this is the given goal.
-    #[must_use]
-    pub fn is(&self, goal: &SentGoal) -> bool {
-        self.connection == goal.connection && self.id == goal.id
-    }
-
     /// Sends a status with the reason why the goal has no effect yet.
     pub fn warn(&self, why: &str) {
-        let id = self.id.as_ref();
-        let status = Respond::status(self.connection, Level::Warning, why, id);
-        self.respond.do_send(status);
+        self.link.status(Level::Warning, why, self.id.as_ref());
     }
 
     /// Sends feedback, if the client gets it.
     pub fn feed_back(&self, values: impl Serialize) {
         if self.wants_feedback {
             let frame = messages::action_feedback(&self.action, self.id.as_ref(), &values);
-            self.send(FrameKind::Feedback, frame);
+            self.link.send(FrameKind::Feedback, frame, None);
         }
     }
 
@@ -129,16 +103,7 @@ impl ActionClient {
         let result = status != GoalStatus::Unknown;
         let (action, id) = (&self.action, self.id.as_ref());
         let frame = messages::action_result(action, id, &values, status as u8, result);
-        self.send(FrameKind::End, frame);
-    }
-
-    fn send(&self, kind: FrameKind, frame: Bytes) {
-        self.respond.do_send(Respond {
-            connection: self.connection,
-            frame,
-            kind,
-            done: None,
-        });
+        self.link.send(FrameKind::End, frame, None);
     }
 
     /// Sends the reason why the goal was not accepted. In this case clients expect a text in `values`.

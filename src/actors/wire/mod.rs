@@ -13,8 +13,7 @@ pub mod action_client;
 
 use std::collections::HashMap;
 use std::fmt::Display;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Weak};
+use std::sync::Weak;
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -22,9 +21,8 @@ use serde::Serialize;
 use tokio::sync::oneshot;
 
 use self::action_client::{ActionRequest, CancelSent, ForwardGoal, Goal};
-use crate::actors::ConnectionId;
 use crate::actors::node::{
-    Asker, Call, Done, FrameKind, Interest, Reply, Respond, Unserved, guard,
+    Asker, Call, ClientLink, Done, FrameKind, Interest, Reply, Unserved, guard,
 };
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::actors::resources::memory::{Memory, Permit, SHORT, cover};
@@ -152,12 +150,8 @@ pub struct ServiceCall {
 pub struct TopicMessage {
     /// The message.
     pub msg: Payload,
-    /// The way back, for an error status.
-    pub respond: Recipient<Respond>,
     /// The client.
-    pub connection: ConnectionId,
-    /// Ends with the client's connection.
-    pub present: Weak<()>,
+    pub link: ClientLink,
     /// Ends with the client's connection, or when the client unsubscribes from the replies to its message.
     pub listening: Weak<()>,
     /// The frame's `id`, if it had one.
@@ -168,49 +162,39 @@ pub struct TopicMessage {
 
 impl TopicMessage {
     /// Sends the client an error status with the reason why the message is not valid for `topic`.
-    pub fn refuse(self, topic: Topic, why: &impl Display) {
-        let msg = format!("{}: {why}", topic.name());
-        let status = Respond::error(self.connection, &msg, self.id.as_ref());
-        self.respond.do_send(Respond {
-            done: Some(self.done),
-            ..status
-        });
+    pub fn refuse(&self, topic: Topic, why: &impl Display) {
+        let why = format!("{}: {why}", topic.name());
+        self.link.status(Level::Error, &why, self.id.as_ref());
     }
 }
 
 /// The calling client, and the way back to it. If it is dropped unanswered, it sends an error.
 pub struct Caller {
-    registry: Recipient<Respond>,
-    connection: ConnectionId,
+    link: ClientLink,
     /// None once the answer has been given.
     address: Option<Address>,
     /// The room that is taken for a long answer, or else for the long frame that asked.
     permit: Option<Permit>,
-    gone: Arc<AtomicBool>,
     done: Option<Done>,
     /// The pools for long answers.
     memory: Memory,
 }
 
 impl Caller {
-    /// The client `connection`, which called the service of `address`. `memory` has the pools for long answers, and
-    /// `permit` is that of the call's frame, if it was long. The receiver ends with the call.
+    /// The client that called the service of `address`. `memory` has the pools for long answers, and `permit` is that
+    /// of the call's frame, if it was long. The receiver ends with the call.
     #[must_use]
     pub fn new(
-        registry: Recipient<Respond>,
-        connection: ConnectionId,
+        link: ClientLink,
         address: Address,
-        gone: Arc<AtomicBool>,
         memory: Memory,
         permit: Option<Permit>,
     ) -> (Self, oneshot::Receiver<()>) {
         let (done, ended) = guard();
         let caller = Self {
-            registry,
-            connection,
+            link,
             address: Some(address),
             permit,
-            gone,
             done: Some(done),
             memory,
         };
@@ -226,7 +210,7 @@ impl Caller {
     /// Whether the caller has disconnected.
     #[must_use]
     pub fn is_gone(&self) -> bool {
-        self.gone.load(Ordering::Relaxed)
+        self.link.is_gone()
     }
 
     /// Reserves memory for an answer of at most `bytes` bytes, besides the echo of the caller's `id`, before it is
@@ -244,12 +228,6 @@ impl Caller {
         true
     }
 
-    /// Tells the caller by a status, before the answer, why what it asked for has no effect yet.
-    fn warn(&self, why: &str) {
-        let status = Respond::status(self.connection, Level::Warning, why, self.id());
-        self.registry.do_send(status);
-    }
-
     /// Answers `result: true`. The call ends when this value is dropped.
     pub fn succeed(&mut self, values: &impl Serialize) {
         self.answer(None, |address| address.response(values, ""));
@@ -263,12 +241,9 @@ impl Caller {
     /// Answers, unless that has been done.
     fn answer(&mut self, done: Option<Done>, write: impl FnOnce(&Address) -> Bytes) {
         if let Some(address) = self.address.take() {
-            self.registry.do_send(Respond {
-                connection: self.connection,
-                frame: cover(self.permit.as_ref(), write(&address)),
-                kind: FrameKind::Answer(address.service()),
-                done,
-            });
+            let frame = cover(self.permit.as_ref(), write(&address));
+            let kind = FrameKind::Answer(address.service());
+            self.link.send(kind, frame, done);
         }
     }
 }
@@ -302,7 +277,8 @@ impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
     }
 
     fn warn(&self, why: &str) {
-        self.caller.warn(why);
+        let id = self.caller.id();
+        self.caller.link.status(Level::Warning, why, id);
     }
 
     fn reserve(&mut self, bytes: usize) -> bool {

@@ -6,7 +6,7 @@ use super::table::table;
 
 table! {
     /// A node of the runtime, by the name that introspection shows.
-    pub enum Node of &'static str {
+    pub enum Node of name {
         /// The arm: dynamics, integrator and controller in one loop.
         ArmSim = "arm_sim",
         /// Inverse kinematics.
@@ -27,13 +27,5 @@ table! {
         Rosapi = "rosapi",
         /// Records runs.
         Recorder if "record" = "recorder",
-    }
-}
-
-impl Node {
-    /// The node's name, without a slash.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        self.entry()
     }
 }

@@ -3,8 +3,20 @@
 //! **Invariant:** a table is an enum, so a `match` on rows must handle every row.
 
 /// Defines an enum of a table's rows: a variant for each, `ALL` in their order, and `entry`, which returns the row. A
-/// variant after the rows holds another table. A row with `if` and a feature exists only with that feature.
+/// variant after the rows holds another table. A row with `if` and a feature exists only with that feature. The rows of a
+/// table `of name` are names.
 macro_rules! table {
+    ($(#[$about:meta])* pub enum $name:ident of name { $($rows:tt)* }) => {
+        table! { $(#[$about])* pub enum $name of &'static str { $($rows)* } }
+
+        impl $name {
+            /// The row's name, as on the wire.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                self.entry()
+            }
+        }
+    };
     (
         $(#[$about:meta])*
         pub enum $name:ident of $entry:ty {

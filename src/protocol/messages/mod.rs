@@ -5,7 +5,6 @@
 //!
 //! **Invariant:** one frame is one line of valid JSON.
 
-pub mod goal;
 pub mod scene;
 mod telemetry;
 
@@ -25,7 +24,7 @@ const USUAL_FRAME: usize = 512;
 
 table! {
     /// The severity of a status, the lowest first.
-    pub enum Level of &'static str {
+    pub enum Level of name {
         /// Information.
         Info = "info",
         /// Something was unexpected, but the operation was done.
@@ -38,28 +37,12 @@ table! {
 table! {
     /// The form in which `values` of a response with `result: false` gives the reason.
     #[derive(Default)]
-    pub enum ErrorForm of &'static str {
+    pub enum ErrorForm of name {
         /// An object, as in any other response. This is the default over raw TCP.
         #[default]
         Object = "object",
         /// The text of `status`, as in `rosbridge_suite`. This is the default over WebSocket.
         Text = "text",
-    }
-}
-
-impl Level {
-    /// The level's name on the wire.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        self.entry()
-    }
-}
-
-impl ErrorForm {
-    /// The form's name on the wire.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        self.entry()
     }
 }
 

@@ -1,5 +1,5 @@
-//! Messages for 3D tools and log viewers: frames, the arm's description, warnings. Web viewers that do not combine
-//! chains of frames get them relative to another frame.
+//! Messages for 3D tools: frames, and the arm's description. Web viewers that do not combine chains of frames get them
+//! relative to another frame.
 //!
 //! **Invariant:** frames and their parents are those of the [description](crate::protocol::ros::urdf). A frame is found
 //! with and without a leading slash, and is sent under the requested name.
@@ -74,25 +74,6 @@ pub struct Quaternion {
     pub z: f64,
     /// The scalar part.
     pub w: f64,
-}
-
-/// `rcl_interfaces/msg/Log`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct LogMessage {
-    /// Simulation time.
-    pub stamp: Stamp,
-    /// 30 is a warning, 40 an error.
-    pub level: u8,
-    /// The node.
-    pub name: &'static str,
-    /// The event, in words.
-    pub msg: String,
-    /// File of the source.
-    pub file: &'static str,
-    /// Empty.
-    pub function: &'static str,
-    /// Line in the file.
-    pub line: u32,
 }
 
 /// Pose of a frame in the plane.

@@ -1,19 +1,22 @@
 //! Messages as binary: `cbor` (the message itself) and `cbor-raw` (its CDR bytes), for subscribers over WebSocket.
 //!
 //! Arrays of numbers are typed arrays (RFC 8746), little-endian, which clients read without parsing each entry. A
-//! number that is not finite is `null` in JSON, and NaN here if the type says that it is a number.
+//! number that is not finite is `null` in JSON, and NaN here if the type says that it is a number. A string that is not
+//! valid text has no encoding.
 //!
 //! **Invariant:** no JSON frame begins with the first byte of a frame here.
 
-use serde_json::Number;
+use std::fmt;
+
+use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_json::value::RawValue;
 
 use super::cdr;
 use super::sink::Sink;
-use super::stamps::member;
-use super::tree::{MessageTree, TreeText};
-use crate::protocol::catalog::Field;
+use super::stamps::members;
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::types::{Count, Type};
+use crate::protocol::wire::json;
 
 /// Major types of CBOR (RFC 8949), in the upper three bits.
 const UNSIGNED: u8 = 0x00;
@@ -27,6 +30,9 @@ const FALSE: u8 = 0xf4;
 const TRUE: u8 = 0xf5;
 const NULL: u8 = 0xf6;
 const FLOAT64: u8 = 0xfb;
+/// Added to the major type of an array or a map without a count, and the mark at its end.
+const ANY_NUMBER: u8 = 0x1f;
+const END: u8 = 0xff;
 /// Typed arrays, little-endian.
 const FLOAT64_ARRAY: u64 = 86;
 const INT32_ARRAY: u64 = 78;
@@ -37,7 +43,7 @@ const INT32_ARRAY: u64 = 78;
 pub fn publish(
     topic: &str,
     type_name: Option<&str>,
-    msg: &MessageTree<'_>,
+    msg: &RawValue,
     most: usize,
 ) -> Option<Vec<u8>> {
     let mut out = head(topic, most);
@@ -51,12 +57,7 @@ pub fn publish(
 /// A whole `publish` frame with the message in CDR; `None` if its type is not known, or if it has more than `most`
 /// bytes.
 #[must_use]
-pub fn publish_raw(
-    topic: &str,
-    type_name: &str,
-    msg: &MessageTree<'_>,
-    most: usize,
-) -> Option<Vec<u8>> {
+pub fn publish_raw(topic: &str, type_name: &str, msg: &RawValue, most: usize) -> Option<Vec<u8>> {
     let one = types::find(type_name)?;
     let (secs, nsecs) = stamp(msg);
     let mut out = head(topic, most);
@@ -73,19 +74,25 @@ pub fn publish_raw(
 }
 
 /// The time in the message's header; 0 if it has none.
-fn stamp(msg: &MessageTree<'_>) -> (u64, u64) {
-    let places = [
-        "/header/stamp",
-        "/stamp",
-        "/clock",
-        "/transforms/0/header/stamp",
-    ];
-    let found = places.into_iter().find_map(|place| msg.pointer(place));
-    let part = |name: &str| found.and_then(|one| member(one, name)?.number()?.as_u64());
+fn stamp(msg: &RawValue) -> (u64, u64) {
+    let places = ["header", "stamp", "clock", "transforms"];
+    let [header, stamp, clock, transforms] = json::members(msg.get(), &places).unwrap_or_default();
+    let first = transforms.and_then(|all| json::entries(all, 1)?.first.pop());
+    let found = member(header, "stamp").or(stamp).or(clock);
+    let found = found.or_else(|| member(member(first, "header"), "stamp"));
+    let part = |name, ros1_name| {
+        let part = member(found, name).or_else(|| member(found, ros1_name));
+        part.and_then(|part| part.get().parse().ok())
+    };
     (
-        part("sec").unwrap_or_default(),
-        part("nanosec").unwrap_or_default(),
+        part("sec", "secs").unwrap_or_default(),
+        part("nanosec", "nsecs").unwrap_or_default(),
     )
+}
+
+fn member<'a>(object: Option<&'a RawValue>, name: &str) -> Option<&'a RawValue> {
+    let [value] = json::members(object?.get(), &[name]).ok()?;
+    value
 }
 
 fn head(topic: &str, most: usize) -> Sink {
@@ -135,13 +142,14 @@ fn float(out: &mut Sink, value: f64) {
 
 /// Writes every present field, in the type's order. Members that the type does not have are omitted, except the ROS 1
 /// names of stamps.
-fn message(out: &mut Sink, one: Type, msg: &MessageTree<'_>) {
-    let has = |name: &str| msg.get(name).is_some();
-    if msg.members().is_none() || (has("sec") && has("secs")) {
+fn message(out: &mut Sink, one: Type, msg: &RawValue) {
+    let has_both = |[own, ros1]: &[Option<&RawValue>; 2]| own.is_some() && ros1.is_some();
+    let Some(members) = members(one, msg).filter(|members| !members.iter().any(has_both)) else {
         return untyped(out, msg);
-    }
-    let found = |field: &'static Field| Some((field, member(msg, field.name)?));
-    let there = one.fields.iter().filter_map(found);
+    };
+    let values = members.iter().map(|[own, ros1]| own.or(*ros1));
+    let fields = one.fields.iter().zip(values);
+    let there = fields.filter_map(|(field, value)| Some((field, value?)));
     length(out, MAP, there.clone().count() as u64);
     for (field, value) in there {
         text(out, field.name);
@@ -156,75 +164,108 @@ fn message(out: &mut Sink, one: Type, msg: &MessageTree<'_>) {
 }
 
 /// A value of type `kind`. If it is a message, `inner` is its type.
-fn single(out: &mut Sink, kind: &str, inner: Option<Type>, value: &MessageTree<'_>) {
-    match (kind, value) {
-        ("float64" | "float32", MessageTree::Null) => float(out, f64::NAN),
-        ("float64" | "float32", MessageTree::Number(number)) => {
-            float(out, number.as_f64().unwrap_or(f64::NAN));
-        }
-        _ => match inner {
-            Some(one) => message(out, one, value),
-            None => untyped(out, value),
-        },
+fn single(out: &mut Sink, kind: &str, inner: Option<Type>, value: &RawValue) {
+    let number = match value.get() {
+        "null" => Some(f64::NAN),
+        _ => json::number(value),
+    };
+    match (kind, inner, number) {
+        ("float64" | "float32", _, Some(number)) => float(out, number),
+        (_, Some(one), _) => message(out, one, value),
+        _ => untyped(out, value),
     }
 }
 
-fn many(out: &mut Sink, kind: &str, inner: Option<Type>, value: &MessageTree<'_>) {
-    let Some(entries) = value.entries() else {
+fn many(out: &mut Sink, kind: &str, inner: Option<Type>, value: &RawValue) {
+    let Some(count) = json::entries(value, 0).map(|entries| entries.count as u64) else {
         return untyped(out, value);
     };
     match kind {
         "float64" => {
             length(out, TAG, FLOAT64_ARRAY);
-            length(out, BYTES, entries.len() as u64 * 8);
-            for entry in entries {
-                let entry = entry.number().and_then(Number::as_f64);
-                out.extend(&entry.unwrap_or(f64::NAN).to_le_bytes());
-            }
+            length(out, BYTES, count * 8);
         }
         "int32" => {
             length(out, TAG, INT32_ARRAY);
-            length(out, BYTES, entries.len() as u64 * 4);
-            for entry in entries {
-                let entry = entry.number().and_then(Number::as_i64);
-                let entry = entry.and_then(|entry| i32::try_from(entry).ok());
-                out.extend(&entry.unwrap_or_default().to_le_bytes());
-            }
+            length(out, BYTES, count * 4);
         }
-        _ => {
-            length(out, ARRAY, entries.len() as u64);
-            for entry in entries {
-                single(out, kind, inner, entry);
-            }
-        }
+        _ => length(out, ARRAY, count),
+    }
+    json::for_each(value, |entry| match kind {
+        "float64" => out.extend(&json::number(entry).unwrap_or(f64::NAN).to_le_bytes()),
+        "int32" => out.extend(&entry.get().parse::<i32>().unwrap_or_default().to_le_bytes()),
+        _ => single(out, kind, inner, entry),
+    });
+}
+
+/// Writes any JSON value in one pass, so its arrays and objects end with a mark instead of beginning with a count.
+fn untyped(out: &mut Sink, value: &RawValue) {
+    if value.deserialize_any(Untyped(out)).is_err() {
+        out.fail();
     }
 }
 
-/// Writes any JSON value. The recursion is as deep as a frame may be nested, which the frame's reader has checked.
-fn untyped(out: &mut Sink, value: &MessageTree<'_>) {
-    match value {
-        MessageTree::Null => out.push(NULL),
-        MessageTree::Bool(false) => out.push(FALSE),
-        MessageTree::Bool(true) => out.push(TRUE),
-        MessageTree::Number(number) => match (number.as_u64(), number.as_i64()) {
-            (Some(number), _) => length(out, UNSIGNED, number),
-            // CBOR writes -1 - n for n; the complement of a negative number is that n.
-            (None, Some(number)) => length(out, NEGATIVE, (!number).unsigned_abs()),
-            (None, None) => float(out, number.as_f64().unwrap_or(f64::NAN)),
-        },
-        MessageTree::Text(string) => text(out, string),
-        MessageTree::Array(entries) => {
-            length(out, ARRAY, entries.len() as u64);
-            for entry in entries {
-                untyped(out, entry);
-            }
+struct Untyped<'out>(&'out mut Sink);
+
+impl<'a> DeserializeSeed<'a> for Untyped<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'a>>(self, reader: D) -> Result<(), D::Error> {
+        reader.deserialize_any(self)
+    }
+}
+
+impl<'a> Visitor<'a> for Untyped<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON value")
+    }
+
+    fn visit_unit<E>(self) -> Result<(), E> {
+        self.0.push(NULL);
+        Ok(())
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<(), E> {
+        self.0.push(if value { TRUE } else { FALSE });
+        Ok(())
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<(), E> {
+        length(self.0, UNSIGNED, value);
+        Ok(())
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<(), E> {
+        // CBOR writes -1 - n for n; the complement of a negative number is that n.
+        length(self.0, NEGATIVE, (!value).unsigned_abs());
+        Ok(())
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<(), E> {
+        float(self.0, value);
+        Ok(())
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<(), E> {
+        text(self.0, value);
+        Ok(())
+    }
+
+    fn visit_seq<A: SeqAccess<'a>>(self, mut entries: A) -> Result<(), A::Error> {
+        self.0.push(ARRAY + ANY_NUMBER);
+        while entries.next_element_seed(Untyped(self.0))?.is_some() {}
+        self.0.push(END);
+        Ok(())
+    }
+
+    fn visit_map<A: MapAccess<'a>>(self, mut members: A) -> Result<(), A::Error> {
+        self.0.push(MAP + ANY_NUMBER);
+        while members.next_key_seed(Untyped(self.0))?.is_some() {
+            members.next_value_seed(Untyped(self.0))?;
         }
-        MessageTree::Object(members) => {
-            length(out, MAP, members.len() as u64);
-            for (TreeText(name), value) in members {
-                text(out, name);
-                untyped(out, value);
-            }
-        }
+        self.0.push(END);
+        Ok(())
     }
 }

@@ -6,38 +6,35 @@
 //! **Invariant:** the offset of every primitive is a multiple of its size, counted from the end of the 4-byte
 //! header.
 
-use serde_json::{Number, Value};
+use std::str::FromStr;
+
+use serde_json::Value;
+use serde_json::value::{RawValue, to_raw_value};
 
 use super::sink::Sink;
-use super::stamps::member;
-use super::tree::MessageTree;
+use super::stamps::members;
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::types::{Count, Type};
+use crate::protocol::wire::json;
 
 /// Little-endian, without options.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
-/// An absent field: the zero of a number, a text, an array or a message.
-static ABSENT: MessageTree<'static> = MessageTree::Bool(false);
 
 /// The bytes of a message of that type.
 #[must_use]
 pub fn encode(one: Type, msg: &Value) -> Vec<u8> {
-    encode_tree(one, &MessageTree::from(msg))
-}
-
-/// The bytes of a message that has been parsed already.
-#[must_use]
-pub fn encode_tree(one: Type, msg: &MessageTree<'_>) -> Vec<u8> {
+    let msg = to_raw_value(msg).unwrap_or_default();
     // No message has more bytes than that.
-    encode_within(one, msg, usize::MAX).unwrap_or_default()
+    encode_within(one, &msg, usize::MAX).unwrap_or_default()
 }
 
-/// The bytes of a message, unless there are more than `most`. Two bytes of JSON (`{}`) may become a hundred.
+/// The bytes of a message, unless there are more than `most`. Two bytes of JSON (`{}`) may become a hundred. `None`
+/// also if a string is not valid text.
 #[must_use]
-pub fn encode_within(one: Type, msg: &MessageTree<'_>, most: usize) -> Option<Vec<u8>> {
+pub fn encode_within(one: Type, msg: &RawValue, most: usize) -> Option<Vec<u8>> {
     let mut sink = Sink::new(most);
     sink.extend(&HEADER);
-    sink.message(one, msg);
+    sink.message(one, Some(msg));
     sink.finish()
 }
 
@@ -47,36 +44,34 @@ pub(super) fn message_type(kind: &str) -> Option<Type> {
 }
 
 /// The whole number in a value; 0 if there is none, or if it does not fit.
-fn whole<T: TryFrom<i128> + Default>(value: &MessageTree<'_>) -> T {
-    let number = value.number().and_then(Number::as_i128);
-    let number = number.and_then(|number| T::try_from(number).ok());
+fn whole<T: FromStr + Default>(value: Option<&RawValue>) -> T {
+    let number = value.and_then(|value| value.get().parse().ok());
     number.unwrap_or_default()
 }
 
 impl Sink {
-    fn message(&mut self, one: Type, msg: &MessageTree<'_>) {
-        for field in one.fields {
-            let value = member(msg, field.name).unwrap_or(&ABSENT);
+    fn message(&mut self, one: Type, msg: Option<&RawValue>) {
+        let members = msg.and_then(|msg| members(one, msg)).unwrap_or_default();
+        let members = members.into_iter().map(|[own, ros1]| own.or(ros1));
+        let members = members.chain(std::iter::repeat(None));
+        for (field, value) in one.fields.iter().zip(members) {
             let (kind, count) = field.element();
             // The type is looked up once for all entries.
             let inner = message_type(kind);
             match count {
                 Count::One => self.single(kind, inner, value),
                 Count::Any => {
-                    let entries = value.entries().unwrap_or_default();
-                    self.count(entries.len());
-                    for entry in entries {
-                        if self.is_over() {
-                            return;
-                        }
-                        self.single(kind, inner, entry);
-                    }
+                    let count = value.and_then(|value| json::entries(value, 0));
+                    self.count(count.map_or(0, |entries| entries.count));
+                    let single = |entry| self.single(kind, inner, Some(entry));
+                    value.and_then(|value| json::for_each(value, single));
                 }
                 // No count is written, because the type gives it.
                 Count::Exactly(count) => {
-                    let mut entries = value.entries().into_iter().flatten();
+                    let entries = value.and_then(|value| json::entries(value, count));
+                    let mut entries = entries.unwrap_or_default().first.into_iter();
                     for _ in 0..count {
-                        self.single(kind, inner, entries.next().unwrap_or(&ABSENT));
+                        self.single(kind, inner, entries.next());
                     }
                 }
             }
@@ -87,13 +82,16 @@ impl Sink {
         clippy::cast_possible_truncation,
         reason = "a float32 is the nearest one"
     )]
-    fn single(&mut self, kind: &str, inner: Option<Type>, value: &MessageTree<'_>) {
-        let float = || match (value, value.number()) {
-            (MessageTree::Null, _) => f64::NAN,
-            (_, number) => number.and_then(Number::as_f64).unwrap_or_default(),
+    fn single(&mut self, kind: &str, inner: Option<Type>, value: Option<&RawValue>) {
+        if self.is_over() {
+            return;
+        }
+        let float = || match value.map(RawValue::get) {
+            Some("null") => f64::NAN,
+            _ => value.and_then(json::number).unwrap_or_default(),
         };
         match kind {
-            "bool" => self.aligned([u8::from(*value == MessageTree::Bool(true))]),
+            "bool" => self.aligned([u8::from(value.and_then(json::boolean) == Some(true))]),
             "byte" | "uint8" | "char" => self.aligned(whole::<u8>(value).to_le_bytes()),
             "int8" => self.aligned(whole::<i8>(value).to_le_bytes()),
             "uint16" => self.aligned(whole::<u16>(value).to_le_bytes()),
@@ -103,10 +101,13 @@ impl Sink {
             "uint64" => self.aligned(whole::<u64>(value).to_le_bytes()),
             "float32" => self.aligned((float() as f32).to_le_bytes()),
             "float64" => self.aligned(float().to_le_bytes()),
-            "string" => self.string(match value {
-                MessageTree::Text(text) => text,
-                _ => "",
-            }),
+            "string" => match value.filter(|value| value.get().starts_with('"')) {
+                None => self.string(""),
+                Some(value) => match json::text(value) {
+                    Some(text) => self.string(&text),
+                    None => self.fail(),
+                },
+            },
             other => match inner {
                 // No type contains itself, so this recursion ends.
                 Some(one) => self.message(one, value),

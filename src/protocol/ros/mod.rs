@@ -10,5 +10,4 @@ pub mod rosapi;
 mod sink;
 pub mod srdf;
 pub mod stamps;
-pub mod tree;
 pub mod urdf;

@@ -1,6 +1,6 @@
 //! A byte buffer with a limit.
 //!
-//! **Invariant:** bytes beyond the limit are discarded.
+//! **Invariant:** there is a whole result, or none.
 
 /// The bytes so far.
 #[derive(Debug)]
@@ -39,21 +39,26 @@ impl Sink {
         }
     }
 
-    /// Whether more than the limit has been written, so writing can stop.
+    /// Whether there will be no result, so writing can stop.
     pub(super) const fn is_over(&self) -> bool {
         self.is_over
     }
 
-    /// All bytes, without spare capacity; `None` if the limit was exceeded.
+    /// A value cannot be written.
+    pub(super) fn fail(&mut self) {
+        self.is_over = true;
+        self.bytes = Vec::new();
+    }
+
+    /// All bytes, without spare capacity; `None` after a failure, or if the limit was exceeded.
     pub(super) fn finish(mut self) -> Option<Vec<u8>> {
         self.bytes.shrink_to_fit();
         (!self.is_over).then_some(self.bytes)
     }
 
     fn has_room(&mut self, more: usize) -> bool {
-        self.is_over |= more > self.most - self.bytes.len();
-        if self.is_over {
-            self.bytes = Vec::new();
+        if more > self.most - self.bytes.len() {
+            self.fail();
         }
         !self.is_over
     }

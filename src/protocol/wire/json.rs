@@ -253,29 +253,36 @@ pub(crate) struct Entries<'a> {
 /// Reads the array `raw` and keeps at most `limit` entries, so a long array uses little memory. `None` if it is
 /// not an array.
 pub(crate) fn entries(raw: &RawValue, limit: usize) -> Option<Entries<'_>> {
-    raw.deserialize_seq(Limit(limit)).ok()
+    let mut entries = Entries::default();
+    for_each(raw, |entry| {
+        if entries.count < limit {
+            entries.first.push(entry);
+        }
+        entries.count += 1;
+        entries.last = Some(entry);
+    })?;
+    Some(entries)
 }
 
-struct Limit(usize);
+/// Passes each entry of the array `raw` to `take`. `None` if it is not an array.
+pub(crate) fn for_each<'a>(raw: &'a RawValue, take: impl FnMut(&'a RawValue)) -> Option<()> {
+    raw.deserialize_seq(Each(take)).ok()
+}
 
-impl<'a> Visitor<'a> for Limit {
-    type Value = Entries<'a>;
+struct Each<F>(F);
+
+impl<'a, F: FnMut(&'a RawValue)> Visitor<'a> for Each<F> {
+    type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a JSON array")
     }
 
-    fn visit_seq<A: SeqAccess<'a>>(self, mut seq: A) -> Result<Entries<'a>, A::Error> {
-        let Self(limit) = self;
-        let mut entries = Entries::default();
+    fn visit_seq<A: SeqAccess<'a>>(mut self, mut seq: A) -> Result<(), A::Error> {
         while let Some(entry) = seq.next_element()? {
-            if entries.count < limit {
-                entries.first.push(entry);
-            }
-            entries.count += 1;
-            entries.last = Some(entry);
+            (self.0)(entry);
         }
-        Ok(entries)
+        Ok(())
     }
 }
 

@@ -56,7 +56,7 @@ const PROTOCOL: [(&str, &[&str]); 8] = [
     ("messages", &["wire"]),
     ("op", &["limits", "catalog", "wire", "messages"]),
     ("outbox", &["limits", "wire"]),
-    ("ros", &["names", "catalog", "messages"]),
+    ("ros", &["names", "catalog", "messages", "wire"]),
 ];
 
 /// Compares the arrows between the subfolders of `folder` with its table of layers.

@@ -3,24 +3,21 @@
 //! **Invariant:** answers are compared whole; names are spelled here as clients spell them.
 
 use pendularm::protocol::catalog::{Action, Node, Rosapi, Service, Topic, types};
-use pendularm::protocol::ros::rosapi::{Census, ListedService, ListedTopic, answer};
+use pendularm::protocol::ros::rosapi::{Census, Listed, answer};
 use serde_json::{Value, json};
 
 /// Clients that publish on `/chat` and `/joint_states`, subscribe to `/wish`, and provide two services.
 fn census() -> Census {
     let topic = |name: &str, type_name: Option<&str>, published, subscribed| {
         let (name, type_name) = (name.into(), type_name.map(Into::into));
-        ListedTopic {
+        Listed {
             name,
             type_name,
             published,
             subscribed,
         }
     };
-    let service = |name: &str, type_name: Option<&str>| ListedService {
-        name: name.into(),
-        type_name: type_name.map(Into::into),
-    };
+    let service = |name: &str, type_name: Option<&str>| topic(name, type_name, true, false);
     Census {
         topics: vec![
             topic("/chat", Some("std_msgs/String"), true, false),

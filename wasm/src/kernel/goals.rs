@@ -5,11 +5,10 @@
 
 use pendularm::live::{GoalOrder, GoalProgress, Obstacle};
 use pendularm::math::goal::Outcome;
+use pendularm::math::kinematics::Unreachable;
 use pendularm::protocol::catalog::Topic;
-use pendularm::protocol::messages::goal::setpoint_trajectory;
 use pendularm::protocol::messages::{self, Level};
-use pendularm::services::arm::joint_names;
-use pendularm::services::goals::{AcceptedGoal, CancelRejected, GoalRejected, GoalRequest};
+use pendularm::services::goals::{AcceptedGoal, CancelRejected, GoalRequest};
 use pendularm::services::{Address, Answered as _};
 
 use super::Kernel;
@@ -52,7 +51,7 @@ impl<const N: usize> Kernel<N> {
         &mut self,
         goal: GoalRequest<N>,
         of_trial: bool,
-    ) -> Result<Option<Obstacle>, GoalRejected> {
+    ) -> Result<Option<Obstacle>, Unreachable> {
         let GoalRequest { target, criteria } = goal;
         let number = self.accepted + 1;
         let tracking = self.arm.track_goal(&GoalOrder {
@@ -74,11 +73,10 @@ impl<const N: usize> Kernel<N> {
     /// Sends the active goal's setpoint to the subscribers, and then to the arm.
     pub(super) fn set_in_motion(&mut self) {
         if let Some(ActiveGoal { goal, .. }) = &self.goal {
-            let (number, positions) = (goal.number, goal.positions);
+            let (number, positions, goal) = (goal.number, goal.positions, goal.clone());
             let topic = Topic::JointTrajectory;
             self.arm.world().publish(topic, move || {
-                let trajectory = setpoint_trajectory(&joint_names::<N>(), &positions);
-                messages::publish(topic.name(), &trajectory)
+                messages::publish(topic.name(), &goal.trajectory())
             });
             self.arm.command_goal(number, positions);
         }

@@ -16,7 +16,7 @@ use self::answers::{ResultCode, feedback, result};
 #[cfg(doc)]
 use crate::actors::arm::sim::Obstacle;
 use crate::actors::arm::sim::{ArmPose, MoveSetpoint, Pose};
-use crate::actors::node::{Barrier, Done, ShutDown};
+use crate::actors::node::{Barrier, Done, ShutDown, Unserved};
 use crate::actors::wire::Nodes;
 use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal, Goal};
 use crate::math::arm::State;
@@ -35,8 +35,6 @@ pub const PERIOD: Duration = Duration::from_millis(5);
 
 /// The reason of a goal that a reset ends.
 const RESET: &str = "the arm was reset";
-/// The reason of a goal that ends because the arm has ended.
-const NO_ANSWER: &str = "the arm does not answer";
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -105,7 +103,7 @@ impl<const N: usize> Handler<ForwardGoal<FollowPath<N>>> for PathFollower<N> {
         let pose = self.arm.send(ArmPose).into_actor(self);
         ctx.wait(pose.map(|pose, node, ctx| match pose {
             Ok(pose) => node.begin(goal, &pose, ctx),
-            Err(_) => goal.client.refuse(NO_ANSWER),
+            Err(_) => goal.client.refuse(Unserved::NO_ARM.0),
         }));
     }
 }
@@ -114,7 +112,7 @@ impl<const N: usize> Handler<CancelSent> for PathFollower<N> {
     type Result = ();
 
     fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
-        let is_meant = |goal: &ActivePath<N>| goal.client.is(&cancel.goal);
+        let is_meant = |goal: &ActivePath<N>| cancel.is_of(&goal.client);
         let Some(goal) = self.active.take_if(|goal| is_meant(goal)) else {
             return cancel.refuse(NOT_ACTIVE);
         };
@@ -208,7 +206,7 @@ impl<const N: usize> PathFollower<N> {
         let pose = self.arm.send(ArmPose).into_actor(self);
         pose.map(|pose, node, ctx| match pose {
             Ok(pose) => node.lead(&pose, None, ctx),
-            Err(_) => node.abort(NO_ANSWER),
+            Err(_) => node.abort(Unserved::NO_ARM.0),
         })
     }
 
@@ -243,7 +241,7 @@ impl<const N: usize> PathFollower<N> {
             match moved {
                 Ok(Ok(())) => node.go_along(standing, ctx),
                 Ok(Err(resets)) => node.give_way(resets),
-                Err(_) => node.abort(NO_ANSWER),
+                Err(_) => node.abort(Unserved::NO_ARM.0),
             }
             drop(done);
         }));

@@ -23,11 +23,8 @@ pub struct SimulationTime;
 
 /// Requests the offline simulation with the same state. From tests.
 #[derive(Message)]
-#[rtype(result = "Snapshot<N>")]
+#[rtype(result = "Box<Simulation<N>>")]
 pub struct TakeSnapshot<const N: usize>;
-
-/// The whole present simulation.
-pub struct Snapshot<const N: usize>(pub Box<Simulation<N>>);
 
 /// The arm's present settings. From `study`, at every call.
 #[derive(Message, Debug, Clone, Copy)]

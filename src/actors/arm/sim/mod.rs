@@ -14,7 +14,7 @@ mod world;
 
 pub use self::messages::{
     ArmPose, ArmSettings, CommandEffort, CommandGoal, Connect, EndGoal, HeldLimit, MoveSetpoint,
-    SetListener, SetSetpoint, SimulationTime, Snapshot, TakeSnapshot, TrackGoal,
+    SetListener, SetSetpoint, SimulationTime, TakeSnapshot, TrackGoal,
 };
 pub use self::node::ArmSim;
 pub use self::orders::ArmOrder;

@@ -10,7 +10,7 @@
 
 use std::collections::VecDeque;
 use std::pin::Pin;
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -19,7 +19,7 @@ use tokio::time::Instant;
 use super::messages::{ArmSettings, Connect, HeldLimit};
 use super::turn::Turn;
 use super::world::ArmWorld;
-use crate::actors::node::{Barrier, Interest, Publish, Reply};
+use crate::actors::node::{Barrier, ClientLink, Interest, Publish, Reply};
 use crate::actors::resources::gauges::Gauges;
 use crate::live::{GoalProgress, LiveArm, PUBLISH_RATE, STEP_PAUSE, StepsAsked};
 use crate::math::arm::Arm;
@@ -39,8 +39,8 @@ pub struct ArmSim<const N: usize> {
     pub(super) steps: VecDeque<Steps<N>>,
     /// Whether they are being taken.
     pub(super) is_stepping: bool,
-    /// Ends when the client with the commanded effort disconnects.
-    pub(super) commander: Option<Weak<()>>,
+    /// The client with the commanded effort.
+    pub(super) commander: Option<ClientLink>,
     /// The node that predicts limits, if there is one.
     pub(super) study: Option<Recipient<HeldLimit<N>>>,
     /// The actors that inform clients of goals, which get barriers.
@@ -182,9 +182,7 @@ impl<const N: usize> ArmSim<N> {
 
     /// Ends the command of a client that has disconnected.
     fn end_orphaned_command(&mut self) {
-        let is_gone = |present: &Weak<()>| present.strong_count() == 0;
-        if self.commander.as_ref().is_some_and(is_gone) {
-            self.commander = None;
+        if self.commander.take_if(|client| client.is_gone()).is_some() {
             self.arm.change(ArmInput::Command([0.0; N]));
         }
     }

@@ -8,13 +8,13 @@ use actix::prelude::*;
 
 use super::messages::{
     ArmPose, CommandEffort, CommandGoal, EndGoal, MoveSetpoint, SetListener, SetSetpoint,
-    SimulationTime, Snapshot, TakeSnapshot, TrackGoal,
+    SimulationTime, TakeSnapshot, TrackGoal,
 };
 use super::node::ArmSim;
 use crate::actors::wire::{Nodes, TopicMessage};
 use crate::live::{GoalProgress, Journal, Pose, Tracking};
 use crate::math::kinematics::Unreachable;
-use crate::math::simulation::ArmInput;
+use crate::math::simulation::{ArmInput, Simulation};
 use crate::protocol::catalog::Topic;
 use crate::services::arm::read_effort;
 use crate::services::trajectory::read_setpoint;
@@ -44,8 +44,8 @@ impl<const N: usize> ArmOrder<N> for SimulationTime {
 }
 
 impl<const N: usize> ArmOrder<N> for TakeSnapshot<N> {
-    fn perform(self, node: &mut ArmSim<N>) -> Snapshot<N> {
-        Snapshot(Box::new(node.arm.simulation.clone()))
+    fn perform(self, node: &mut ArmSim<N>) -> Box<Simulation<N>> {
+        Box::new(node.arm.simulation.clone())
     }
 }
 
@@ -104,7 +104,7 @@ impl<const N: usize> ArmOrder<N> for CommandEffort<N> {
     fn perform(self, node: &mut ArmSim<N>) {
         let Self { effort, message } = self;
         match node.arm.command(effort) {
-            Ok(()) => node.commander = Some(message.present),
+            Ok(()) => node.commander = Some(message.link),
             Err(why) => message.refuse(Topic::EffortCommands, &why),
         }
     }

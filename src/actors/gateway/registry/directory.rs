@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::actors::ConnectionId;
 use crate::protocol::op::Served;
-use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTED};
+use crate::protocol::ros::rosapi::{Census, Listed, MAX_LISTED};
 
 /// The services and the actions by their absolute names, each with its provider.
 #[derive(Default)]
@@ -56,12 +56,14 @@ impl Directory {
     }
 
     /// Lists the topics, services and actions, up to the limit of each list.
-    pub(crate) fn census(&self, topics: impl Iterator<Item = ListedTopic>) -> Census {
+    pub(crate) fn census(&self, topics: impl Iterator<Item = Listed>) -> Census {
         let listed = |kind| {
             let all = self.0.get(&kind).into_iter().flatten().take(MAX_LISTED);
-            let all = all.map(|(name, one)| ListedService {
+            let all = all.map(|(name, one)| Listed {
                 name: Arc::clone(name),
                 type_name: one.type_name.clone(),
+                published: true,
+                subscribed: false,
             });
             all.collect()
         };
@@ -85,7 +87,7 @@ mod tests {
             let provider = (ConnectionId(1), &*name(n));
             directory.provide(Served::Service, &name(n), provider, None);
         }
-        let topics = (0..=MAX_LISTED).map(|n| ListedTopic {
+        let topics = (0..=MAX_LISTED).map(|n| Listed {
             name: name(n).into(),
             type_name: None,
             published: true,

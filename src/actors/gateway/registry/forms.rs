@@ -7,13 +7,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytes::Bytes;
+use serde_json::value::RawValue;
 
 use crate::actors::resources::memory::{Permit, cover_message};
 use crate::protocol::messages;
 use crate::protocol::names::OWN_ID_PREFIX;
 use crate::protocol::op::{Compression, Encoding};
 use crate::protocol::outbox::MAX_MESSAGE;
-use crate::protocol::ros::tree::MessageTree;
 use crate::protocol::ros::{cbor, stamps};
 use crate::protocol::wire::{fragments, series};
 
@@ -87,7 +87,7 @@ impl ToEncode {
             return fragments::split(plain, size, &id, MAX_MESSAGE).map(Some);
         }
         let msg = messages::message_text(spelling, plain);
-        let msg = &MessageTree::read(msg).ok()?;
+        let msg: &RawValue = serde_json::from_slice(msg).ok()?;
         let bytes = match encoding.compression {
             Compression::CborRaw => cbor::publish_raw(spelling, type_name?, msg, MAX_MESSAGE)?,
             _ => cbor::publish(spelling, type_name, msg, MAX_MESSAGE)?,

@@ -33,7 +33,7 @@ use self::forwarded::Requests;
 use self::kept::{Kept, KeptEntry};
 use self::places::Places;
 use crate::actors::ConnectionId;
-use crate::actors::node::{Barrier, Done, FrameKind, Respond, guard};
+use crate::actors::node::{Barrier, ClientLink, Done, FrameKind, Respond, guard};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::{Permit, cover};
 pub use crate::actors::wire::Nodes;
@@ -42,7 +42,7 @@ use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, ErrorForm, Level};
 use crate::protocol::op::{Encoding, GoalStatus, Incoming, Op, OpError, Served, Verbosity};
 use crate::protocol::outbox::Throttle;
-use crate::protocol::ros::rosapi::{Census, ListedTopic};
+use crate::protocol::ros::rosapi::{Census, Listed};
 use crate::protocol::wire::json::Payload;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -50,7 +50,7 @@ use crate::protocol::wire::json::Payload;
 /// The registry actor.
 #[derive(Default)]
 pub struct Registry {
-    clients: HashMap<ConnectionId, Client>,
+    clients: BTreeMap<ConnectionId, Client>,
     topics: Topics,
     directory: Directory,
     /// Calls and goals that wait for the clients that serve them.
@@ -78,6 +78,8 @@ pub struct Registry {
 /// The registry's entry of one client.
 struct Client {
     outlets: Outlets,
+    /// The client, as the nodes get it.
+    link: ClientLink,
     /// Its address.
     from: IpAddr,
     /// The sum of its registrations, and of its calls and goals that wait for other clients.
@@ -90,8 +92,6 @@ struct Client {
     verbosity: Verbosity,
     /// The form in which it gets the reason of a failed call.
     error_form: ErrorForm,
-    /// Dropped when the client disconnects.
-    present: Arc<()>,
     /// Replaced when the client unsubscribes from the feedback of its goals, and dropped with the client.
     listening: Arc<()>,
     /// The guard that its calls to other clients share, and the receiver that ends with them. Removed when the client
@@ -133,16 +133,16 @@ impl Registry {
 }
 
 impl Client {
-    fn new(outlets: Outlets, from: IpAddr) -> Self {
+    fn new(outlets: Outlets, from: IpAddr, link: ClientLink) -> Self {
         Self {
             outlets,
+            link,
             from,
             kept: Kept::default(),
             registered: Registrations::default(),
             withdrawn: HashSet::new(),
             verbosity: Verbosity::ALL,
             error_form: ErrorForm::default(),
-            present: Arc::default(),
             listening: Arc::default(),
             calls: Some(guard()),
         }
@@ -342,8 +342,8 @@ impl Topics {
     }
 
     /// The topics in the form of rosapi.
-    pub(super) fn listed(&self) -> impl Iterator<Item = ListedTopic> {
-        self.by_name.iter().map(|(name, users)| ListedTopic {
+    pub(super) fn listed(&self) -> impl Iterator<Item = Listed> {
+        self.by_name.iter().map(|(name, users)| Listed {
             name: Arc::clone(name),
             type_name: users.type_name.clone(),
             published: users.publishers > 0,
@@ -477,10 +477,8 @@ pub struct TakeCensus;
 
 /// A message or call in the registry, as the tap gets it.
 pub enum Tapped<'a> {
-    /// A message of the runtime, as the whole `publish` frame.
+    /// A message on a topic of the runtime, from a node or a client, as the whole `publish` frame.
     Published(Topic, &'a Bytes),
-    /// A client's message on a topic to which the runtime subscribes.
-    NodeMessage(Topic, &'a Payload),
     /// A client's call of one of the runtime's services.
     Called {
         /// The client.
@@ -577,7 +575,7 @@ impl Handler<Barrier> for Registry {
 impl Handler<Connect> for Registry {
     type Result = Result<ConnectionId, Refused>;
 
-    fn handle(&mut self, connect: Connect, _: &mut Context<Self>) -> Self::Result {
+    fn handle(&mut self, connect: Connect, ctx: &mut Context<Self>) -> Self::Result {
         if self.closed.is_some() {
             return Err(Refused::Closed);
         }
@@ -588,7 +586,12 @@ impl Handler<Connect> for Registry {
         }
         self.connections_made += 1;
         let id = ConnectionId(self.connections_made);
-        let client = Client::new(connect.outlets, connect.from);
+        let link = ClientLink {
+            registry: ctx.address().recipient(),
+            connection: id,
+            gone: Arc::clone(&connect.outlets.gone),
+        };
+        let client = Client::new(connect.outlets, connect.from, link);
         self.clients.insert(id, client);
         self.gauges.set_connections(self.clients.len() as u64);
         Ok(id)
@@ -706,10 +709,7 @@ impl Handler<FinishAll> for Registry {
     type Result = ();
 
     fn handle(&mut self, _: FinishAll, _: &mut Context<Self>) {
-        // Sorted, so that the order is the same in every run.
-        let mut clients: Vec<_> = self.clients.iter().collect();
-        clients.sort_unstable_by_key(|(id, _)| **id);
-        for (_, client) in clients {
+        for client in self.clients.values() {
             client.outlets.mailbox.do_send(ToClient::Finish);
         }
     }
@@ -724,10 +724,8 @@ impl Registry {
             Op::Publish { topic, msg } => return self.publish(origin, &topic, msg, ctx),
             Op::PublishLines(lines) => return self.publish_lines(origin.from, &lines, ctx),
             Op::CallService(call) => return self.call(origin, call, ctx),
-            Op::SendActionGoal(goal) => return self.send_action_goal(origin, goal, ctx),
-            Op::CancelActionGoal { action } => {
-                return self.cancel_action_goal(origin, &action, ctx);
-            }
+            Op::SendActionGoal(goal) => return self.send_action_goal(origin, goal),
+            Op::CancelActionGoal { action } => return self.cancel_action_goal(origin, &action),
             Op::Advertise { topic, type_name } => {
                 self.advertise(&origin, &topic, type_name.as_deref())
             }

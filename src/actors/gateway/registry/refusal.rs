@@ -20,13 +20,11 @@ pub(crate) enum Refusal {
         "compression: cbor-raw needs a message type that this runtime knows; give it as type, or subscribe with cbor"
     )]
     UnknownType,
-    #[error("id: a subscription's id has at most {0} bytes")]
-    LongSubscriptionId(usize),
-    #[error("{noun}: {1} is {verb}d by the runtime itself", noun = .0.noun(), verb = verb(*.0))]
+    #[error("{noun}: {1} belongs to the runtime itself", noun = .0.noun())]
     OfRuntime(Served, String),
-    #[error("{noun}: this connection does not {verb} {1}", noun = .0.noun(), verb = verb(*.0))]
+    #[error("{noun}: this connection does not serve {1}", noun = .0.noun())]
     NotServed(Served, String),
-    #[error("{noun}: the {request} with this id belongs to {1}", noun = .0.noun(), request = request(*.0))]
+    #[error("{noun}: the request with this id belongs to {1}", noun = .0.noun())]
     OfAnother(Served, String),
     #[error("id: no call of {0} with this id waits for this connection")]
     StaleCall(String),
@@ -58,20 +56,4 @@ pub(crate) enum Refusal {
     ActionType(&'static str),
     #[error("{0}")]
     Closed(&'static str),
-}
-
-/// The verb for the provider.
-const fn verb(kind: Served) -> &'static str {
-    match kind {
-        Served::Service => "provide",
-        Served::Action => "serve",
-    }
-}
-
-/// The word for a request to the provider.
-const fn request(kind: Served) -> &'static str {
-    match kind {
-        Served::Service => "call",
-        Served::Action => "goal",
-    }
 }

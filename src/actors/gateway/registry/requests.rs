@@ -15,9 +15,7 @@ use super::{FrameOrigin, Handled, RefuseCalls, Registry, Tapped};
 use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
 use crate::actors::node::{Done, guard};
 use crate::actors::resources::memory::cover_message;
-use crate::actors::wire::action_client::{
-    ActionClient, ActionRequest, CancelSent, ForwardGoal, SentGoal,
-};
+use crate::actors::wire::action_client::{ActionClient, ActionRequest, CancelSent, ForwardGoal};
 use crate::actors::wire::{Caller, Route, ServiceCall};
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
@@ -60,10 +58,8 @@ impl Registry {
                     let address = Address::new(service, call.service.into_boxed_str(), origin.id)
                         .with_errors(client.error_form);
                     let (caller, ended) = Caller::new(
-                        ctx.address().recipient(),
-                        origin.from,
+                        client.link.clone(),
                         address,
-                        Arc::clone(&client.outlets.gone),
                         self.gauges.memory().clone(),
                         self.permit.clone(),
                     );
@@ -98,12 +94,7 @@ impl Registry {
     }
 
     /// Sends a goal to the node, or the client, that serves its action. A failure is the goal's one result.
-    pub(super) fn send_action_goal(
-        &mut self,
-        origin: FrameOrigin,
-        goal: ActionGoal,
-        ctx: &mut Context<Self>,
-    ) -> Handled {
+    pub(super) fn send_action_goal(&mut self, origin: FrameOrigin, goal: ActionGoal) -> Handled {
         let Some(client) = self.clients.get(&origin.from) else {
             return Handled::at_once();
         };
@@ -114,12 +105,10 @@ impl Registry {
                 Ok(node) => {
                     let (done, ended) = guard();
                     let client = ActionClient {
-                        respond: ctx.address().recipient(),
-                        connection: origin.from,
+                        link: client.link.clone(),
                         action: Arc::from(goal.action),
                         id: origin.id,
                         wants_feedback: goal.feedback,
-                        gone: Arc::clone(&client.outlets.gone),
                     };
                     let goal = goal.args;
                     node(ActionRequest::Goal(ForwardGoal { goal, client, done }));
@@ -153,14 +142,10 @@ impl Registry {
     }
 
     /// Cancels a goal of the same client.
-    pub(super) fn cancel_action_goal(
-        &mut self,
-        origin: FrameOrigin,
-        action: &str,
-        ctx: &mut Context<Self>,
-    ) -> Handled {
+    pub(super) fn cancel_action_goal(&mut self, origin: FrameOrigin, action: &str) -> Handled {
         let node = Action::from_name(action).and_then(|action| self.nodes.actions.get(&action));
-        let Some(node) = node else {
+        let client = self.clients.get(&origin.from);
+        let Some((node, client)) = node.zip(client) else {
             if let Err(why) = self.forward_cancellation(&origin, action) {
                 self.refuse(&origin, &why);
             }
@@ -168,11 +153,8 @@ impl Registry {
         };
         let (done, ended) = guard();
         node(ActionRequest::Cancel(CancelSent {
-            goal: SentGoal {
-                connection: origin.from,
-                id: origin.id,
-            },
-            respond: ctx.address().recipient(),
+            link: client.link.clone(),
+            id: origin.id,
             done,
         }));
         Handled::with(ended)

@@ -20,7 +20,6 @@ use crate::actors::resources::memory::cover_message;
 use crate::actors::wire::TopicMessage;
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::{Direction, Topic};
-use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
 use crate::protocol::op::{Compression, Encoding, Subscribe};
@@ -79,7 +78,7 @@ impl Registry {
         subscribe: &Subscribe,
     ) -> Result<(), Refusal> {
         let id: Option<Box<str>> = origin.id.as_ref().map(|id| id.get().into());
-        self.may_subscribe(id.as_deref(), subscribe)?;
+        self.may_subscribe(subscribe)?;
         let topic = subscribe.topic.as_str();
         let absolute = names::absolute(topic);
         let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
@@ -131,10 +130,7 @@ impl Registry {
         Ok(())
     }
 
-    fn may_subscribe(&self, id: Option<&str>, subscribe: &Subscribe) -> Result<(), Refusal> {
-        if id.is_some_and(|id| id.len() > MAX_NAME) {
-            return Err(Refusal::LongSubscriptionId(MAX_NAME));
-        }
+    fn may_subscribe(&self, subscribe: &Subscribe) -> Result<(), Refusal> {
         let topic = subscribe.topic.as_str();
         if subscribe.encoding.compression == Compression::CborRaw {
             let own = || subscribe.type_name.as_deref().and_then(types::find);
@@ -279,13 +275,12 @@ impl Registry {
         let (done, ended) = guard();
         self.encode_aside(delivered.long, &done, ctx);
         if let Some(tap) = &mut self.tap {
-            tap(Tapped::NodeMessage(topic, &msg));
+            let frame = messages::publish_raw(topic.name(), &msg);
+            tap(Tapped::Published(topic, &frame));
         }
         listener(TopicMessage {
             msg,
-            respond: ctx.address().recipient(),
-            connection: origin.from,
-            present: Arc::downgrade(&client.present),
+            link: client.link.clone(),
             listening: Arc::downgrade(&client.listening),
             id: origin.id,
             done,
@@ -499,7 +494,7 @@ fn deliver(subscriber: &Subscriber, frame: Bytes) {
 #[cfg(test)]
 mod tests {
     use super::super::Topics;
-    use crate::protocol::ros::rosapi::ListedTopic;
+    use crate::protocol::ros::rosapi::Listed;
 
     #[test]
     fn the_first_type_stays_with_a_topic_and_a_topic_with_its_last_user() {
@@ -508,8 +503,8 @@ mod tests {
         topics.add_publisher("/t");
         assert!(topics.note_type("/t", "a/b") && !topics.note_type("/t", "c/d"));
         for _ in 0..2 {
-            let listed: Vec<ListedTopic> = topics.listed().collect();
-            let one = ListedTopic {
+            let listed: Vec<Listed> = topics.listed().collect();
+            let one = Listed {
                 name: "/t".into(),
                 type_name: Some("a/b".into()),
                 published: true,

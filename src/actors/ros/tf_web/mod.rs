@@ -174,7 +174,7 @@ impl<const N: usize> Handler<CancelSent> for TfRepublisher<N> {
 
     fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
         let is_meant = |subscription: &SubscribeFrames<N>| match &subscription.by {
-            FrameReceiver::Client(client) => client.is(&cancel.goal),
+            FrameReceiver::Client(client) => cancel.is_of(client),
             FrameReceiver::Topic { .. } => false,
         };
         let mut all = self.subscriptions.iter();
@@ -234,14 +234,14 @@ impl<const N: usize> SubscribeFrames<N> {
 
     fn client(&self) -> ConnectionId {
         match &self.by {
-            FrameReceiver::Client(client) => client.connection,
+            FrameReceiver::Client(client) => client.link.connection,
             FrameReceiver::Topic { connection, .. } => *connection,
         }
     }
 
     fn is_gone(&self) -> bool {
         match &self.by {
-            FrameReceiver::Client(client) => client.is_gone(),
+            FrameReceiver::Client(client) => client.link.is_gone(),
             FrameReceiver::Topic { listening, .. } => listening.strong_count() == 0,
         }
     }

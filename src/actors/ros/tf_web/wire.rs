@@ -1,6 +1,6 @@
 //! Requests for frames in JSON.
 //!
-//! **Invariant:** a request names only frames of the arm. Others are refused by name.
+//! **Invariant:** a request has only frames of the arm. Unknown ones are left out, and an unknown target is refused.
 
 use std::borrow::Cow;
 use std::time::Duration;
@@ -35,7 +35,7 @@ impl<const N: usize> TfRepublisher<N> {
         let subscribe = |(id, goal), message: TopicMessage| {
             let by = FrameReceiver::Topic {
                 id,
-                connection: message.connection,
+                connection: message.link.connection,
                 listening: message.listening,
             };
             SubscribeFrames { goal, by }
@@ -96,11 +96,8 @@ impl<const N: usize> Goal for FrameGoal<N> {
 impl<const N: usize> FrameGoal<N> {
     fn of(fields: &mut Fields<'_>) -> Self {
         let sources = fields.texts("source_frames", MAX_FRAMES);
-        let is_long = |name: &String| name.len() > MAX_NAME;
-        if sources.iter().flatten().any(is_long) {
-            let why = format!("must have names of at most {MAX_NAME} bytes");
-            fields.refuse("source_frames", &why);
-        }
+        let mut sources = sources.unwrap_or_default();
+        sources.retain(|name| is_frame(name, N));
         let target = fields.text("target_frame");
         let rate = fields.number("rate", Bound::NonNegative);
         if let Some(target) = target.as_ref().filter(|target| !is_frame(target, N)) {
@@ -110,7 +107,7 @@ impl<const N: usize> FrameGoal<N> {
         check_thresholds(fields);
         let rate = rate.filter(|rate| *rate > 0.0).unwrap_or(RATE);
         Self {
-            sources: sources.unwrap_or_default(),
+            sources,
             target: target.unwrap_or_default().into_owned(),
             period: Duration::from_secs_f64(rate.max(LEAST_RATE).recip()),
         }

@@ -18,48 +18,35 @@ pub const MAX_LISTED: usize = 4096;
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Census {
     /// Topics that clients advertise or subscribe to, the runtime's own included, by absolute name.
-    pub topics: Vec<ListedTopic>,
+    pub topics: Vec<Listed>,
     /// Services that clients provide, by absolute name.
-    pub services: Vec<ListedService>,
+    pub services: Vec<Listed>,
     /// Actions that clients serve, by absolute name.
-    pub actions: Vec<ListedService>,
+    pub actions: Vec<Listed>,
 }
 
 impl Census {
     /// The most bytes of a list of it: every byte of a name may be escaped as six.
     #[must_use]
     pub fn most_bytes(&self) -> usize {
-        let length = |name: &str, type_name: Option<&str>| {
-            64 + 6 * (name.len() + type_name.map_or(0, str::len))
-        };
-        let topics = self.topics.iter();
-        let topics = topics.map(|one| length(&one.name, one.type_name.as_deref()));
-        let served = self.services.iter().chain(&self.actions);
-        let served = served.map(|one| length(&one.name, one.type_name.as_deref()));
-        topics.chain(served).sum()
+        let all = self.topics.iter().chain(&self.services);
+        let all = all.chain(&self.actions);
+        let names = all.map(|one| one.name.len() + one.type_name.as_deref().map_or(0, str::len));
+        names.map(|bytes| 64 + 6 * bytes).sum()
     }
 }
 
-/// A topic that clients use.
+/// A topic, a service or an action of clients.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ListedTopic {
+pub struct Listed {
     /// Its name.
     pub name: Arc<str>,
     /// Its type, from the first client that named one.
     pub type_name: Option<Arc<str>>,
-    /// Whether a client advertises it.
+    /// Whether a client publishes the topic, or serves the service or action.
     pub published: bool,
-    /// Whether a client subscribes to it.
+    /// Whether a client subscribes to the topic.
     pub subscribed: bool,
-}
-
-/// A service that a client provides, or an action that it serves.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ListedService {
-    /// Its name.
-    pub name: Arc<str>,
-    /// Its type, if its provider has named it.
-    pub type_name: Option<Arc<str>>,
 }
 
 /// A topic, a service or an action, and its nodes.
@@ -126,7 +113,7 @@ pub(super) fn actions(census: &Census) -> Vec<Row<'_>> {
     own.chain(of_clients(&census.actions)).collect()
 }
 
-fn of_clients(listed: &[ListedService]) -> impl Iterator<Item = Row<'_>> {
+fn of_clients(listed: &[Listed]) -> impl Iterator<Item = Row<'_>> {
     listed.iter().map(|one| {
         let type_name = one.type_name.as_deref().unwrap_or_default();
         served(&*one.name, type_name, Node::Gateway)

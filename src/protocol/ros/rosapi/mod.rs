@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
-pub use self::graph::{Census, ListedService, ListedTopic, MAX_LISTED};
+pub use self::graph::{Census, Listed, MAX_LISTED};
 use self::graph::{Row, actions, are_same_type, node_name, services, topics};
 pub use self::typedef::asked_type;
 use self::typedef::{details, interfaces};
