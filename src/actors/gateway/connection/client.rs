@@ -1,5 +1,5 @@
-//! The state of one client that the actor's handlers, its reader and its writer share: its transport, its computations
-//! and its output. The writer drains the output, and only the writer writes to the socket of a served client.
+//! The actor of one client: its transport, its computations and its output. The handler of the registry's messages fills
+//! the output. The writer drains it, and only the writer writes to the socket of a served client.
 //!
 //! The writer is polled after each message that the actor has handled, so the contents of the outbox are offered to the
 //! socket in the same turn.
@@ -8,27 +8,25 @@
 //! deadline expires only for a client that is finishing, or for which responses or a long message have waited without a
 //! break. One poll writes a bounded number of bytes.
 
-use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::future::poll_fn;
 use std::pin::Pin;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
 use bytes::Bytes;
-use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::sync::Notify;
 use tokio::time::{Instant, Sleep, sleep_until};
 
 use super::flow::{Ends, FRESH, FlowControl, UnreadSource};
-use super::transport::{ClientLost, Transport};
+use super::transport::{ClientLost, ClientStream, Transport};
 use super::turns::Turns;
 use crate::actors::gateway::limits::{
     LINGER, MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES,
 };
 use crate::actors::gateway::registry::{Registry, Request, ToClient};
+use crate::actors::panics::{Contained, contain};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::SHORT;
 use crate::protocol::catalog::Service;
@@ -37,8 +35,8 @@ use crate::protocol::outbox::{MAX_AGE, Outbox};
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
-/// The state of one client that the actor's handlers, its reader and its writer share.
-pub(super) struct ClientState<S> {
+/// The actor of one client. Its handler, its reader and its writer have access to it in turn.
+pub struct Connection<S> {
     /// The stream, after the session has ended.
     pub(super) transport: Option<Transport<S>>,
     pub(super) ends: Ends,
@@ -65,10 +63,12 @@ pub(super) struct ClientState<S> {
     pub(super) is_refused: bool,
     /// Set when the reader has ended.
     pub(super) is_read_to_its_end: bool,
+    /// Notifies the session that the runtime is ending.
+    pub(super) finish: Arc<Notify>,
 }
 
-impl<S> ClientState<S> {
-    /// The state of a client whose session has not ended.
+impl<S: ClientStream> Connection<S> {
+    /// The actor of a client whose session has not ended.
     pub(super) fn new(
         ends: Ends,
         unread: UnreadSource,
@@ -92,6 +92,7 @@ impl<S> ClientState<S> {
             is_finishing: false,
             is_refused: false,
             is_read_to_its_end: false,
+            finish: Arc::default(),
         }
     }
 
@@ -100,10 +101,15 @@ impl<S> ClientState<S> {
         self.transport.as_mut().ok_or(ClientLost::Gone)
     }
 
+    /// Whether the client is served over WebSocket.
+    pub(super) fn is_socket(&self) -> bool {
+        self.transport.as_ref().is_some_and(Transport::is_socket)
+    }
+
     // ---- into the outbox --------------------------------------------------------------------------------------------
 
     /// Puts a message of the registry into the outbox.
-    pub(super) fn accept(&mut self, message: ToClient) {
+    fn accept(&mut self, message: ToClient) {
         match message {
             ToClient::Deliver { topic, frame } => {
                 let now = Instant::now().into_std();
@@ -120,7 +126,10 @@ impl<S> ClientState<S> {
                 }
             }
             ToClient::Configure { topic, throttle } => self.outbox.configure(&topic, throttle),
-            ToClient::Finish => self.is_finishing = true,
+            ToClient::Finish => {
+                self.is_finishing = true;
+                self.finish.notify_one();
+            }
         }
     }
 
@@ -268,21 +277,36 @@ impl<S> ClientState<S> {
     }
 }
 
-// ---- the writer -----------------------------------------------------------------------------------------------------
+// ---- the actor ------------------------------------------------------------------------------------------------------
 
-/// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
-pub(super) fn write<S>(client: Rc<RefCell<ClientState<S>>>) -> impl Future<Output = ()>
-where
-    S: AsyncRead + AsyncWrite + Unpin,
-{
-    let mut writer = ClientWriter::default();
-    poll_fn(move |cx| writer.poll_to_the_end(&mut client.borrow_mut(), cx))
+impl<S: ClientStream> Actor for Connection<S> {
+    type Context = Context<Self>;
 }
+
+impl<S: ClientStream> Handler<ToClient> for Connection<S> {
+    type Result = ();
+
+    fn handle(&mut self, message: ToClient, ctx: &mut Context<Self>) {
+        if let Err(panic) = contain(|| self.accept(message)) {
+            Self::fail("actor", &panic, ctx);
+        }
+    }
+}
+
+impl<S: ClientStream> Connection<S> {
+    /// Ends the connection after a panic in `part` of it.
+    pub(super) fn fail(part: &str, panic: &Contained, ctx: &mut Context<Self>) {
+        tracing::error!(%panic, "a client's {part} failed; its connection ends");
+        ctx.stop();
+    }
+}
+
+// ---- the writer -----------------------------------------------------------------------------------------------------
 
 /// The writing half of a connection.
 #[derive(Default)]
-struct ClientWriter {
-    timer: Option<Pin<Box<Sleep>>>,
+pub(super) struct ClientWriter {
+    timer: Timer,
     turns: Turns,
     /// Deadline of the end of the stream.
     end_due: Option<Instant>,
@@ -290,43 +314,36 @@ struct ClientWriter {
     reader_due: Option<Instant>,
 }
 
-impl ClientWriter {
-    fn poll_to_the_end<S: AsyncRead + AsyncWrite + Unpin>(
-        &mut self,
-        client: &mut ClientState<S>,
+impl<S: ClientStream> ActorFuture<Connection<S>> for ClientWriter {
+    type Output = ();
+
+    /// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
+    fn poll(
+        self: Pin<&mut Self>,
+        client: &mut Connection<S>,
+        _: &mut Context<Connection<S>>,
         cx: &mut task::Context<'_>,
     ) -> Poll<()> {
-        if self.reader_due.is_none() {
-            let is_all_written = ready!(self.poll_write(client, cx));
-            let transport = client.transport.as_ref();
-            let is_answered = transport.is_some_and(Transport::is_socket);
-            if !is_all_written || !(client.is_refused || is_answered) {
+        let writer = self.get_mut();
+        if writer.reader_due.is_none() {
+            let is_all_written = ready!(writer.poll_write(client, cx));
+            if !is_all_written || !(client.is_refused || client.is_socket()) {
                 return Poll::Ready(());
             }
-            self.reader_due = Some(Instant::now() + LINGER);
+            writer.reader_due = Some(Instant::now() + LINGER);
         }
         if client.is_read_to_its_end {
             return Poll::Ready(());
         }
-        self.poll_timer(self.reader_due, cx)
+        writer.timer.poll(writer.reader_due, cx)
     }
+}
 
-    /// Ready once `due` has passed. Without a deadline it is never ready.
-    fn poll_timer(&mut self, due: Option<Instant>, cx: &mut task::Context<'_>) -> Poll<()> {
-        let Some(due) = due else {
-            return Poll::Pending;
-        };
-        let timer = self.timer.get_or_insert_with(|| Box::pin(sleep_until(due)));
-        if timer.deadline() != due {
-            timer.as_mut().reset(due);
-        }
-        timer.as_mut().poll(cx)
-    }
-
+impl ClientWriter {
     /// Writes the queued messages. Ready at the end of the connection, with whether all of them were written.
-    fn poll_write<S: AsyncRead + AsyncWrite + Unpin>(
+    fn poll_write<S: ClientStream>(
         &mut self,
-        client: &mut ClientState<S>,
+        client: &mut Connection<S>,
         cx: &mut task::Context<'_>,
     ) -> Poll<bool> {
         let mut written = 0;
@@ -366,16 +383,16 @@ impl ClientWriter {
                 self.turns.rest();
                 (None, client.next_release())
             };
-            ready!(self.poll_timer(patience.or(release), cx));
+            ready!(self.timer.poll(patience.or(release), cx));
             if patience.is_some() {
                 return Poll::Ready(false);
             }
         }
     }
 
-    fn poll_end<S: AsyncRead + AsyncWrite + Unpin>(
+    fn poll_end<S: ClientStream>(
         &mut self,
-        client: &mut ClientState<S>,
+        client: &mut Connection<S>,
         cx: &mut task::Context<'_>,
     ) -> Poll<bool> {
         let is_refused = client.is_refused;
@@ -385,6 +402,24 @@ impl ClientWriter {
             return Poll::Ready(ended.is_ok());
         }
         let due = *self.end_due.get_or_insert_with(|| Instant::now() + LINGER);
-        self.poll_timer(Some(due), cx).map(|()| false)
+        self.timer.poll(Some(due), cx).map(|()| false)
+    }
+}
+
+/// A timer whose deadline may change.
+#[derive(Default)]
+pub(super) struct Timer(Option<Pin<Box<Sleep>>>);
+
+impl Timer {
+    /// Ready once `due` has passed. Without a deadline it is never ready.
+    pub(super) fn poll(&mut self, due: Option<Instant>, cx: &mut task::Context<'_>) -> Poll<()> {
+        let Some(due) = due else {
+            return Poll::Pending;
+        };
+        let timer = self.0.get_or_insert_with(|| Box::pin(sleep_until(due)));
+        if timer.deadline() != due {
+            timer.as_mut().reset(due);
+        }
+        timer.as_mut().poll(cx)
     }
 }

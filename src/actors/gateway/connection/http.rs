@@ -2,16 +2,16 @@
 //!
 //! **Invariant:** over WebSocket, no status is sent before the client requests statuses.
 
-use std::cell::Cell;
 use std::future::pending;
 
 use bytes::BytesMut;
-use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::sync::mpsc::{self, UnboundedSender};
+use tokio::sync::oneshot;
 use tokio::time::Instant;
 
 use super::admission::HeldSlot;
 use super::session::{ClientSession, HeldPlace, Opened};
-use super::transport::Transport;
+use super::transport::{ClientStream, Transport};
 use crate::actors::gateway::registry::{Refused, Request};
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Incoming, Op, Verbosity};
@@ -20,23 +20,17 @@ use crate::web::serve::{self, Gate};
 /// A client without a place: its slot, and the reason. `None` means that the token is missing.
 pub(super) type Newcomer<'a> = (HeldSlot<'a>, Option<Refused>);
 
-/// Admits or refuses the requests of one client.
+/// Asks the session whether a client is admitted. The session takes only the first request of a client without a place.
 struct HttpGate<'a> {
     session: &'a ClientSession,
-    /// Set until the first request is admitted, if the client came without a place.
-    newcomer: Cell<Option<Newcomer<'a>>>,
-    place: Cell<Option<HeldPlace>>,
+    requests: UnboundedSender<oneshot::Sender<Result<(), String>>>,
 }
 
 impl Gate for HttpGate<'_> {
     async fn admit(&self) -> Result<(), String> {
-        let Some((slot, _)) = self.newcomer.take() else {
-            return Ok(());
-        };
-        let place = self.session.wait_for_place(&slot).await;
-        let place = place.map_err(|why| self.session.turn_away(Some(why)))?;
-        self.place.set(Some(place));
-        Ok(())
+        let (reply, answer) = oneshot::channel();
+        let _ = self.requests.send(reply);
+        answer.await.unwrap_or(Ok(()))
     }
 
     async fn delay(&self) {
@@ -47,45 +41,51 @@ impl Gate for HttpGate<'_> {
 impl ClientSession {
     /// Answers the requests of a client. Returns the client if it opens a WebSocket. A newcomer gets a place when its
     /// first request is admitted.
-    pub(super) async fn serve_http<S>(
+    pub(super) async fn serve_http<S: ClientStream>(
         &self,
         stream: S,
         first: BytesMut,
         due: Instant,
         client: Result<HeldPlace, Newcomer<'_>>,
-    ) -> Option<Opened<S>>
-    where
-        S: AsyncRead + AsyncWrite + Unpin + 'static,
-    {
-        let (place, newcomer) = match client {
+    ) -> Option<Opened<S>> {
+        let (mut place, newcomer) = match client {
             Ok(place) => (Some(place), None),
             Err(newcomer) => (None, Some(newcomer)),
         };
-        let evicted = newcomer.as_ref().map(|(slot, _)| slot.evicted());
+        let (requests, mut asked) = mpsc::unbounded_channel();
         let gate = HttpGate {
             session: self,
-            newcomer: Cell::new(newcomer),
-            place: Cell::new(place),
+            requests,
         };
-        // The reason for an evicted client. After its request is admitted, the response has the reason instead.
-        let crowded = async {
-            if let Some(evicted) = evicted {
-                evicted.await;
-                if let Some((_, why)) = gate.newcomer.take() {
-                    return self.turn_away(why);
-                }
+        // Returns the reason for an evicted client. After its request, the response has the reason instead.
+        let admitting = async {
+            if let Some((slot, why)) = newcomer {
+                let request = tokio::select! {
+                    biased;
+                    request = asked.recv() => request,
+                    () = slot.evicted() => return self.turn_away(why),
+                };
+                let answer = match self.wait_for_place(&slot).await {
+                    Ok(held) => {
+                        place = Some(held);
+                        Ok(())
+                    }
+                    Err(why) => Err(self.turn_away(Some(why))),
+                };
+                let _ = request.map(|reply| reply.send(answer));
             }
+            drop(asked);
             pending().await
         };
         let cut_off = async {
             tokio::select! {
                 () = self.finish.notified() => None,
-                why = crowded => Some(why),
+                why = admitting => Some(why),
             }
         };
         let site = (&self.admission.site, self.ends.local);
         let (stream, behind) = serve::serve(stream, first, due, site, &gate, cut_off).await?;
-        let place = gate.place.take()?;
+        let place = place?;
         let quiet = Request {
             from: place.id(),
             incoming: Incoming {

@@ -18,7 +18,7 @@ use super::admission::{
     Admission, AuthError, HeldSlot, WRONG_TOKEN_TIME, authenticate, first_op, is_command,
 };
 use super::flow::Ends;
-use super::transport::Transport;
+use super::transport::{ClientStream, Transport};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{
     FRAME_TIME, HEAD_TIME, LINGER, LOOK_AGAIN, OPENING_TIME, READ_BYTES,
@@ -87,10 +87,7 @@ enum Detected {
 
 impl ClientSession {
     /// Runs the session. Returns the client if it exchanges frames, or if it is refused in a frame.
-    pub(super) async fn run<S>(self, mut stream: S) -> Option<Opened<S>>
-    where
-        S: AsyncRead + AsyncWrite + Unpin + 'static,
-    {
+    pub(super) async fn run<S: ClientStream>(self, mut stream: S) -> Option<Opened<S>> {
         let mut first = BytesMut::with_capacity(READ_BYTES);
         let asks_token = self.admission.token.is_some();
         let mut place = if asks_token {

@@ -35,6 +35,11 @@ pub(super) enum ClientLost {
     Refused,
 }
 
+/// The stream of a client.
+pub trait ClientStream: AsyncRead + AsyncWrite + Unpin + 'static {}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> ClientStream for S {}
+
 /// The stream of a served client, and its protocol.
 pub(super) struct Transport<S> {
     stream: S,
@@ -46,7 +51,7 @@ enum Protocol {
     WebSocket(Box<WebSocket>),
 }
 
-impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
+impl<S: ClientStream> Transport<S> {
     /// A stream of lines.
     pub(super) const fn plain(stream: S) -> Self {
         let protocol = Protocol::Plain(FrameReader::new());

@@ -11,8 +11,7 @@
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::future::poll_fn;
-use std::task::{Context, Poll, Waker};
+use std::task::{Context, Waker};
 
 use tokio::task::yield_now;
 
@@ -74,19 +73,6 @@ impl Turns {
         if was_empty {
             actix_rt::spawn(give_turns());
         }
-    }
-
-    /// Ends the turn of the task, and continues in its next one, or when the task is woken before.
-    pub(super) async fn pause(&mut self) {
-        let mut has_ended = false;
-        poll_fn(|cx| {
-            if std::mem::replace(&mut has_ended, true) {
-                return Poll::Ready(());
-            }
-            self.end(cx);
-            Poll::Pending
-        })
-        .await;
     }
 
     /// Notes that the task has nothing to do.
