@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!              accepts                 Request, Disconnect              Call of a question, SetSetpoint, Interest
-//!  listener ───────────▶ connection ──────────────────▶ registry ─ wire ────────────────────────────────▶ nodes
+//!  listener ───────────▶ connection ──────────────────▶ registry ───────────────────────────────────────▶ nodes
 //!                            ▲           ToClient           │ ▲            Publish, Respond
 //!                            └──────────────────────────────┘ └──────────────────────────────────────── nodes
 //! ```
@@ -32,7 +32,6 @@ pub mod recorder;
 pub mod resources;
 pub mod ros;
 pub mod runtime;
-pub mod wire;
 
 /// Identifies one client connection during the life of the process. It is never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -1,12 +1,22 @@
-//! The messages of the nodes: questions with one answer, messages on topics, interest.
+//! The messages of the nodes: questions with one answer, messages on topics, interest, goals. And the way of a client's
+//! call or goal to its node and back.
 //!
 //! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. The asker,
 //! a client or another node, is behind the [`Reply`].
 //!
-//! **Invariant:** every [`Call`] is answered exactly once, even if its node fails: a [`Reply`] that is dropped
-//! unanswered sends an error.
+//! A question that clients can send defines its reader and the writer of its answer ([`Callable`], [`Answered`]). The
+//! table of routes ([`Nodes`]) defines the node. All errors on the way are handled here: invalid arguments, a dropped
+//! question, and the form of an error.
+//!
+//! **Invariant:** every [`Call`] is answered exactly once, even if its node fails: a [`Reply`] or a [`Caller`] that is
+//! dropped unanswered sends an error. A node sees no JSON. Arguments are read before a node gets the call, never on the
+//! node's thread, and its answer is written on the thread that answers. Feedback of a goal may be dropped for a slow
+//! client. The end of a goal is never dropped, and follows all feedback.
 
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::fmt::Display;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Weak};
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -14,10 +24,14 @@ use serde::Serialize;
 use tokio::sync::oneshot;
 
 use super::ConnectionId;
-use crate::protocol::catalog::{Service, Topic};
+use crate::actors::resources::long_work::{WorkKind, run_long_work};
+use crate::actors::resources::memory::{Memory, Permit, SHORT, cover};
+use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::messages::{self, Level};
+use crate::protocol::op::fields::Rejections;
+use crate::protocol::op::{Arguments, GoalStatus};
 use crate::protocol::wire::json::Payload;
-pub use crate::services::Ask;
+pub use crate::services::{Address, Answered, Ask, Callable};
 
 // ---- questions ------------------------------------------------------------------------------------------------------
 
@@ -266,3 +280,410 @@ impl Respond {
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct Barrier;
+
+// ---- the table of routes: the node of each service, action and topic ------------------------------------------------
+
+/// Arguments longer than this are read on a worker thread. Numbers near the middle between two doubles take 5 µs for
+/// each 24 bytes, so these take a fifth of a millisecond. Usual ones are shorter.
+const LONG_ARGUMENTS: usize = 1024;
+
+/// Passes a message to its node.
+pub type Route<T> = Box<dyn Fn(T) + Send>;
+
+/// The runtime's own nodes, by the services, topics and actions that they serve.
+#[derive(Default)]
+pub struct Nodes {
+    /// Passes a call to the node that answers it.
+    pub services: HashMap<Service, Route<ServiceCall>>,
+    /// Passes a goal to the node that serves its action.
+    pub actions: HashMap<Action, Route<ActionRequest>>,
+    /// Passes a message to the node that subscribes to its topic.
+    pub listeners: HashMap<Topic, Route<TopicMessage>>,
+    /// The node that publishes each of the runtime's topics.
+    pub publishers: HashMap<Topic, Recipient<Interest>>,
+}
+
+impl Nodes {
+    /// A row of a node's table: calls of `service` are this question. Its fields are read here, and the rejected ones
+    /// are reported.
+    pub fn serve<A: Answered>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
+        let node = node.into();
+        let take = move |call: ServiceCall| {
+            let node = node.clone();
+            let length = call.arguments.get().len();
+            let read = move || {
+                let mut caller = call.caller;
+                match A::read(call.service, &call.arguments) {
+                    Ok(ask) => {
+                        let done = caller.done.take();
+                        let asker = ClientAsker {
+                            caller,
+                            write: A::write,
+                        };
+                        let reply = Reply::new(asker, done);
+                        node.do_send(Call { ask, reply });
+                    }
+                    Err(rejections) => caller.refuse(&rejections.status()),
+                }
+            };
+            read_arguments(length, read);
+        };
+        self.services.insert(service, Box::new(take));
+    }
+
+    /// Messages of clients on `topic` are read by `read`, and are for this node as `to_node` makes them.
+    pub fn listen<T: 'static, E: Display + 'static, M: Message<Result = ()> + Send + 'static>(
+        &mut self,
+        topic: Topic,
+        node: impl Into<Recipient<M>>,
+        read: fn(&Payload) -> Result<T, E>,
+        to_node: fn(T, TopicMessage) -> M,
+    ) {
+        let node = node.into();
+        let take = move |message: TopicMessage| {
+            let node = node.clone();
+            let length = message.msg.get().len();
+            read_arguments(length, move || match read(&message.msg) {
+                Ok(content) => node.do_send(to_node(content, message)),
+                Err(why) => message.refuse(topic, &why),
+            });
+        };
+        self.listeners.insert(topic, Box::new(take));
+    }
+
+    /// Goals of this kind, and their cancellations, are for this node.
+    pub fn carry_out<G: Goal, A>(&mut self, node: Addr<A>)
+    where
+        A: Actor<Context = Context<A>> + Handler<ForwardGoal<G>> + Handler<CancelSent>,
+    {
+        let take = move |request| match request {
+            ActionRequest::Goal(ForwardGoal { goal, client, done }) => {
+                let node = node.clone();
+                let length = goal.get().len();
+                let read = move || match G::read(&goal) {
+                    Ok(goal) => node.do_send(ForwardGoal { goal, client, done }),
+                    Err(rejections) => client.refuse(&rejections.status()),
+                };
+                read_arguments(length, read);
+            }
+            ActionRequest::Cancel(cancel) => node.do_send(cancel),
+        };
+        self.actions.insert(G::ACTION, Box::new(take));
+    }
+}
+
+/// Reads arguments of `length` bytes: long ones on another thread, while the client's next frames wait.
+fn read_arguments(length: usize, read: impl FnOnce() + Send + 'static) {
+    if length > LONG_ARGUMENTS {
+        // The task is boxed, so only one kind is compiled, and not one for each service.
+        let read: Box<dyn FnOnce() + Send> = Box::new(read);
+        actix_rt::spawn(run_long_work(WorkKind::of(length), read));
+    } else {
+        read();
+    }
+}
+
+// ---- a client's call, and the way back ------------------------------------------------------------------------------
+
+/// A call of one of the runtime's own services, forwarded by the registry.
+pub struct ServiceCall {
+    /// The service that was called.
+    pub service: Service,
+    /// The caller's arguments, not parsed yet.
+    pub arguments: Arguments,
+    /// The way back.
+    pub caller: Caller,
+}
+
+/// A client's message on a topic of the runtime, forwarded by the registry.
+pub struct TopicMessage {
+    /// The message.
+    pub msg: Payload,
+    /// The way back, for an error status.
+    pub respond: Recipient<Respond>,
+    /// The client.
+    pub connection: ConnectionId,
+    /// Ends with the client's connection.
+    pub present: Weak<()>,
+    /// Ends with the client's connection, or when the client unsubscribes from the replies to its message.
+    pub listening: Weak<()>,
+    /// The frame's `id`, if it had one.
+    pub id: Option<Payload>,
+    /// Dropped when the message has taken effect. The connection reads its next frame then.
+    pub done: Done,
+}
+
+impl TopicMessage {
+    /// Sends the client an error status with the reason why the message is not valid for `topic`.
+    pub fn refuse(self, topic: Topic, why: &impl Display) {
+        let msg = format!("{}: {why}", topic.name());
+        let status = Respond::error(self.connection, &msg, self.id.as_ref());
+        self.respond.do_send(Respond {
+            done: Some(self.done),
+            ..status
+        });
+    }
+}
+
+/// The calling client, and the way back to it. If it is dropped unanswered, it sends an error.
+pub struct Caller {
+    registry: Recipient<Respond>,
+    connection: ConnectionId,
+    /// None once the answer has been given.
+    address: Option<Address>,
+    /// The room that is taken for a long answer, or else for the long frame that asked.
+    permit: Option<Permit>,
+    gone: Arc<AtomicBool>,
+    done: Option<Done>,
+    /// The pools for long answers.
+    memory: Memory,
+}
+
+impl Caller {
+    /// The client `connection`, which called the service of `address`. `memory` has the pools for long answers, and
+    /// `permit` is that of the call's frame, if it was long. The receiver ends with the call.
+    #[must_use]
+    pub fn new(
+        registry: Recipient<Respond>,
+        connection: ConnectionId,
+        address: Address,
+        gone: Arc<AtomicBool>,
+        memory: Memory,
+        permit: Option<Permit>,
+    ) -> (Self, oneshot::Receiver<()>) {
+        let (done, ended) = guard();
+        let caller = Self {
+            registry,
+            connection,
+            address: Some(address),
+            permit,
+            gone,
+            done: Some(done),
+            memory,
+        };
+        (caller, ended)
+    }
+
+    /// The caller's `id`, which the response echoes.
+    #[must_use]
+    pub fn id(&self) -> Option<&Payload> {
+        self.address.as_ref()?.id()
+    }
+
+    /// Whether the caller has disconnected.
+    #[must_use]
+    pub fn is_gone(&self) -> bool {
+        self.gone.load(Ordering::Relaxed)
+    }
+
+    /// Reserves memory for an answer of at most `bytes` bytes, besides the echo of the caller's `id`, before it is
+    /// computed. `false` while other answers use it. Short answers need no reservation.
+    pub fn reserve(&mut self, bytes: usize) -> bool {
+        let id = self.id().map_or(0, |id| id.get().len());
+        let bytes = bytes.saturating_add(id);
+        if bytes <= SHORT {
+            return true;
+        }
+        let Some(permit) = self.memory.answer(bytes) else {
+            return false;
+        };
+        self.permit = Some(permit);
+        true
+    }
+
+    /// Tells the caller by a status, before the answer, why what it asked for has no effect yet.
+    fn warn(&self, why: &str) {
+        let status = Respond::status(self.connection, Level::Warning, why, self.id());
+        self.registry.do_send(status);
+    }
+
+    /// Answers `result: true`. The call ends when this value is dropped.
+    pub fn succeed(&mut self, values: &impl Serialize) {
+        self.answer(None, |address| address.response(values, ""));
+    }
+
+    /// Answers `result: false` with empty values, for the reason `why`.
+    pub fn refuse(&mut self, why: &str) {
+        self.answer(None, |address| address.failure(why));
+    }
+
+    /// Answers, unless that has been done.
+    fn answer(&mut self, done: Option<Done>, write: impl FnOnce(&Address) -> Bytes) {
+        if let Some(address) = self.address.take() {
+            self.registry.do_send(Respond {
+                connection: self.connection,
+                frame: cover(self.permit.as_ref(), write(&address)),
+                kind: FrameKind::Answer(address.service()),
+                done,
+            });
+        }
+    }
+}
+
+impl Drop for Caller {
+    fn drop(&mut self) {
+        self.refuse(&Unserved::ENDED.to_string());
+    }
+}
+
+// ---- a caller that waits for a node's answer ------------------------------------------------------------------------
+
+/// A client that has asked for a `T`.
+struct ClientAsker<T> {
+    caller: Caller,
+    /// Writes the answer.
+    write: fn(T, &Address) -> Bytes,
+}
+
+impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>) {
+        let Self { mut caller, write } = *self;
+        caller.answer(done, |address| match answer {
+            Ok(answer) => write(answer, address),
+            Err(why) => address.failure(&why.to_string()),
+        });
+    }
+
+    fn is_gone(&self) -> bool {
+        self.caller.is_gone()
+    }
+
+    fn warn(&self, why: &str) {
+        self.caller.warn(why);
+    }
+
+    fn reserve(&mut self, bytes: usize) -> bool {
+        self.caller.reserve(bytes)
+    }
+}
+
+// ---- goals of an action ---------------------------------------------------------------------------------------------
+
+/// A client's goal or cancellation, forwarded by the registry.
+pub enum ActionRequest {
+    /// A goal whose fields are not parsed yet.
+    Goal(ForwardGoal<Arguments>),
+    /// A cancellation.
+    Cancel(CancelSent),
+}
+
+/// A goal that clients send by an action.
+pub trait Goal: Sized + Send + 'static {
+    /// The action.
+    const ACTION: Action;
+
+    /// Reads a goal.
+    ///
+    /// # Errors
+    /// All rejected fields, by name.
+    fn read(arguments: &Arguments) -> Result<Self, Rejections>;
+}
+
+/// A goal with its client. From clients, by the action.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct ForwardGoal<G> {
+    /// The goal.
+    pub goal: G,
+    /// The client that sent it.
+    pub client: ActionClient,
+    /// Dropped when the goal has started or is refused. The client's next frame is read then.
+    pub done: Done,
+}
+
+/// Cancels the goal that the same client has sent. From clients, by the action.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct CancelSent {
+    /// The goal. Its client gets an error status if it is not active.
+    pub goal: SentGoal,
+    /// The way back.
+    pub respond: Recipient<Respond>,
+    /// Dropped when the goal has ended.
+    pub done: Done,
+}
+
+/// A goal of the action: its client and the client's id.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SentGoal {
+    /// The connection.
+    pub connection: ConnectionId,
+    /// The goal's id, if it has one.
+    pub id: Option<Payload>,
+}
+
+/// The client that sent a goal, and its recipients.
+pub struct ActionClient {
+    /// The way back.
+    pub respond: Recipient<Respond>,
+    /// The connection.
+    pub connection: ConnectionId,
+    /// The action's name as the client spells it.
+    pub action: Arc<str>,
+    /// The goal's id, if it has one.
+    pub id: Option<Payload>,
+    /// Whether the client gets feedback.
+    pub wants_feedback: bool,
+    /// Set when the client has disconnected.
+    pub gone: Arc<AtomicBool>,
+}
+
+impl CancelSent {
+    /// Sends the reason why no goal was cancelled.
+    pub fn refuse(&self, why: &str) {
+        let SentGoal { connection, id } = &self.goal;
+        let status = Respond::error(*connection, why, id.as_ref());
+        self.respond.do_send(status);
+    }
+}
+
+impl ActionClient {
+    /// Whether the client has disconnected.
+    #[must_use]
+    pub fn is_gone(&self) -> bool {
+        self.gone.load(Ordering::Relaxed)
+    }
+
+    /// Whether this is the given goal.
+    #[must_use]
+    pub fn is(&self, goal: &SentGoal) -> bool {
+        self.connection == goal.connection && self.id == goal.id
+    }
+
+    /// Sends a status with the reason why the goal has no effect yet.
+    pub fn warn(&self, why: &str) {
+        let id = self.id.as_ref();
+        let status = Respond::status(self.connection, Level::Warning, why, id);
+        self.respond.do_send(status);
+    }
+
+    /// Sends feedback, if the client gets it.
+    pub fn feed_back(&self, values: impl Serialize) {
+        if self.wants_feedback {
+            let frame = messages::action_feedback(&self.action, self.id.as_ref(), &values);
+            self.send(FrameKind::Feedback, frame);
+        }
+    }
+
+    /// Sends the result of the goal.
+    pub fn conclude(&self, values: impl Serialize, status: GoalStatus) {
+        let result = status != GoalStatus::Unknown;
+        let (action, id) = (&self.action, self.id.as_ref());
+        let frame = messages::action_result(action, id, &values, status as u8, result);
+        self.send(FrameKind::End, frame);
+    }
+
+    fn send(&self, kind: FrameKind, frame: Bytes) {
+        self.respond.do_send(Respond {
+            connection: self.connection,
+            frame,
+            kind,
+            done: None,
+        });
+    }
+
+    /// Sends the reason why the goal was not accepted. In this case clients expect a text in `values`.
+    pub fn refuse(&self, why: &str) {
+        self.conclude(why, GoalStatus::Unknown);
+    }
+}

@@ -23,7 +23,7 @@ use crate::actors::gateway::connection::admission::{Admission, Slots};
 use crate::actors::gateway::files;
 use crate::actors::gateway::listener::{self, Listener, StopListening};
 use crate::actors::gateway::registry::{Attach, FinishAll, RefuseCalls, Registry};
-use crate::actors::node::ShutDown;
+use crate::actors::node::{Nodes, ShutDown};
 use crate::actors::nodes;
 use crate::actors::panics::contain;
 #[cfg(feature = "record")]
@@ -31,7 +31,6 @@ use crate::actors::recorder::{self, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::priority::lower_priority;
 use crate::actors::ros::rosout::Rosout;
-use crate::actors::wire::Nodes;
 #[cfg(feature = "web")]
 use crate::address::Host;
 use crate::math::arm::Arm;

@@ -15,9 +15,10 @@ use serde::Serialize;
 use crate::actors::arm::sim::{
     ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal, Tracking, joint_names,
 };
-use crate::actors::node::{Ask, Asker, Barrier, Call, Done, Publish, Reply, ShutDown, Unserved};
-use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal, Goal, SentGoal};
-use crate::actors::wire::{Callable, Nodes};
+use crate::actors::node::{
+    ActionClient, Ask, Asker, Barrier, Call, Callable, CancelSent, Done, ForwardGoal, Goal, Nodes,
+    Publish, Reply, SentGoal, ShutDown, Unserved,
+};
 use crate::math::goal::Outcome;
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::messages::goal::setpoint_trajectory;

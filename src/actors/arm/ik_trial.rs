@@ -12,8 +12,7 @@ use actix::prelude::*;
 
 use super::ik_action::{CancelRequest, GoalReport, GoalRequest, SendGoal};
 use crate::actors::arm::sim::{ArmPose, Pose};
-use crate::actors::node::{Barrier, Call, Interest, Publish, Reply, Unserved, ask};
-use crate::actors::wire::Nodes;
+use crate::actors::node::{Barrier, Call, Interest, Nodes, Publish, Reply, Unserved, ask};
 use crate::math::trial::{Conclusion, Trial, TrialCommand, sample};
 use crate::protocol::catalog::{Service, Topic};
 use crate::services::trial::status_message;

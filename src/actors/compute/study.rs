@@ -14,8 +14,7 @@ use tokio::sync::oneshot;
 use super::answering::answer;
 use super::workers::WorkerPool;
 use crate::actors::arm::sim::{ArmSettings, HeldLimit};
-use crate::actors::node::{Call, Reply, Unserved};
-use crate::actors::wire::Nodes;
+use crate::actors::node::{Call, Nodes, Reply, Unserved};
 use crate::protocol::catalog::Service;
 use crate::services::study::{Computed, Integrating, Work};
 pub use crate::services::study::{

@@ -20,8 +20,7 @@ pub use self::requests::{NotRecorded, RecordTo, Recorded, StartRecording, StopRe
 use self::tape::{Begun, TapeTarget};
 use crate::actors::arm::sim::SetListener;
 use crate::actors::gateway::registry::SetTap;
-use crate::actors::node::Call;
-use crate::actors::wire::Nodes;
+use crate::actors::node::{Call, Nodes};
 use crate::protocol::catalog::Service;
 use crate::record::RunSettings;
 

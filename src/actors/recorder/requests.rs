@@ -11,8 +11,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::limits::MAX_FILE_NAME;
-use crate::actors::node::Ask;
-use crate::actors::wire::{Address, Answered, Callable};
+use crate::actors::node::{Address, Answered, Ask, Callable};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};

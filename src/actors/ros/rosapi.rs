@@ -10,9 +10,8 @@ use bytes::Bytes;
 use tokio::time::sleep;
 
 use crate::actors::gateway::registry::TakeCensus;
-use crate::actors::node::{Ask, Call};
+use crate::actors::node::{Address, Answered, Ask, Call, Callable, Nodes};
 use crate::actors::resources::long_work::{WorkKind, WorkPermit};
-use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};

@@ -7,8 +7,7 @@ use tokio::sync::mpsc;
 use tracing::Level;
 
 use crate::actors::arm::sim::SimulationTime;
-use crate::actors::node::{Interest, Publish};
-use crate::actors::wire::Nodes;
+use crate::actors::node::{Interest, Nodes, Publish};
 use crate::logging::{self, Warning};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::Stamp;

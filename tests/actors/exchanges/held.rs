@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::node::Caller;
 use pendularm::actors::resources::memory::Memory;
-use pendularm::actors::wire::Caller;
 use pendularm::protocol::catalog::Service;
 use serde_json::Value;
 

@@ -92,7 +92,7 @@ fn the_walks_name_existing_files_and_become_no_longer() {
         table(&paper, "a message passes"),
         table(&paper, "a call passes"),
     );
-    assert!(message.len() <= 12 && call.len() <= 17);
+    assert!(message.len() <= 12 && call.len() <= 16);
     for row in [message, call].concat() {
         let path = codes(&row[0])[0];
         let (source, names) = (text(path), codes(&row[1]));

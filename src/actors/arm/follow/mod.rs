@@ -16,9 +16,9 @@ use self::answers::{ResultCode, feedback, result};
 #[cfg(doc)]
 use crate::actors::arm::sim::Obstacle;
 use crate::actors::arm::sim::{ArmPose, MoveSetpoint, Pose};
-use crate::actors::node::{Barrier, Done, ShutDown};
-use crate::actors::wire::Nodes;
-use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal, Goal};
+use crate::actors::node::{
+    ActionClient, Barrier, CancelSent, Done, ForwardGoal, Goal, Nodes, ShutDown,
+};
 use crate::math::arm::State;
 use crate::math::goal::{Cadence, Dwell};
 use crate::math::pid::Setpoint;

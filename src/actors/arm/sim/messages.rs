@@ -4,8 +4,7 @@
 
 use actix::prelude::*;
 
-use crate::actors::node::{Barrier, Done};
-use crate::actors::wire::TopicMessage;
+use crate::actors::node::{Barrier, Done, TopicMessage};
 use crate::live::{ArmListener, GoalOrder, GoalProgress, Pose, Tracking};
 use crate::math::kinematics::Unreachable;
 use crate::math::pid::Setpoint;

@@ -11,7 +11,7 @@ use super::messages::{
     SimulationTime, Snapshot, TakeSnapshot, TrackGoal,
 };
 use super::node::ArmSim;
-use crate::actors::wire::{Nodes, TopicMessage};
+use crate::actors::node::{Nodes, TopicMessage};
 use crate::live::{GoalProgress, Journal, Pose, Tracking};
 use crate::math::kinematics::Unreachable;
 use crate::math::simulation::ArmInput;

@@ -10,8 +10,7 @@ use actix::prelude::*;
 
 use super::node::{ArmSim, Steps, pass_barriers};
 use super::orders;
-use crate::actors::node::{Call, ShutDown, Unserved};
-use crate::actors::wire::Nodes;
+use crate::actors::node::{Call, Nodes, ShutDown, Unserved};
 use crate::live::ArmRequest;
 use crate::protocol::catalog::{Direction, Node, Rosapi, Service, Topic};
 use crate::services::arm::{

@@ -13,12 +13,11 @@ use super::forwarded::Forwarded;
 use super::refusal::Refusal;
 use super::{FrameOrigin, Handled, RefuseCalls, Registry, Tapped};
 use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
-use crate::actors::node::{Done, guard};
-use crate::actors::resources::memory::cover_message;
-use crate::actors::wire::action_client::{
-    ActionClient, ActionRequest, CancelSent, ForwardGoal, SentGoal,
+use crate::actors::node::{
+    ActionClient, ActionRequest, Caller, CancelSent, Done, ForwardGoal, Route, SentGoal,
+    ServiceCall, guard,
 };
-use crate::actors::wire::{Caller, Route, ServiceCall};
+use crate::actors::resources::memory::cover_message;
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;

@@ -22,8 +22,9 @@ use tokio::time::Instant;
 
 use crate::actors::ConnectionId;
 use crate::actors::arm::sim::{ArmPose, Pose};
-use crate::actors::node::{Ask, Call, Interest, Publish, ShutDown};
-use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal};
+use crate::actors::node::{
+    ActionClient, Ask, Call, CancelSent, ForwardGoal, Interest, Publish, ShutDown,
+};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::scene::{TfMessage, WORLD, frames, seen_from};
 use crate::protocol::messages::{Empty, Header, Stamp};

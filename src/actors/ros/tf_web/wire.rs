@@ -13,8 +13,7 @@ use super::{
     FrameGoal, FrameReceiver, MAX_FRAMES, RepublishTfs, SubscribeFrames, TfRepublisher,
     UnsubscribeFrames,
 };
-use crate::actors::wire::action_client::Goal;
-use crate::actors::wire::{Address, Answered, Callable, Nodes, TopicMessage};
+use crate::actors::node::{Address, Answered, Callable, Goal, Nodes, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::scene::{WORLD, is_frame};
