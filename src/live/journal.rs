@@ -3,7 +3,7 @@
 //! **Invariant:** if a listener misses an input, its next event is the whole simulation.
 
 use crate::math::arm::State;
-use crate::math::simulation::{ArmInput, Checkpoint, Simulation};
+use crate::math::simulation::{ArmInput, Simulation, StepNote};
 
 /// An event of the arm, for a record.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,12 +17,8 @@ pub struct StepEvent<const N: usize> {
 /// The kinds of events.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ArmEvent<const N: usize> {
-    /// The whole simulation, as the start.
-    Began(Box<Checkpoint<N>>),
-    /// An input has taken effect.
-    Changed(ArmInput<N>),
-    /// The next step was not finite and was not taken.
-    Diverged,
+    /// The start of the journal, an input that has taken effect, or a divergence.
+    Noted(StepNote<N>),
     /// The arm's state.
     Stands {
         /// Positions and velocities.
@@ -60,7 +56,7 @@ impl<const N: usize> Journal<N> {
 
     /// Records that an input has taken effect, after this number of steps.
     pub(crate) fn change(&mut self, steps: u64, input: ArmInput<N>) {
-        self.tell(steps, ArmEvent::Changed(input));
+        self.tell(steps, StepNote::Input(input));
         if matches!(input, ArmInput::Reset) {
             self.before_reset += steps;
         }
@@ -68,13 +64,13 @@ impl<const N: usize> Journal<N> {
 
     /// Records that the due step has not been taken.
     pub(crate) fn diverge(&mut self, simulation: &Simulation<N>) {
-        self.tell(simulation.steps(), ArmEvent::Diverged);
+        self.tell(simulation.steps(), StepNote::Diverged);
     }
 
-    /// Sends an event that must not be missed.
-    fn tell(&mut self, steps: u64, event: ArmEvent<N>) {
+    /// Sends a note, which must not be missed.
+    fn tell(&mut self, steps: u64, note: StepNote<N>) {
         if self.is_whole {
-            self.is_whole = self.say(steps, event);
+            self.is_whole = self.say(steps, ArmEvent::Noted(note));
         }
     }
 
@@ -82,8 +78,8 @@ impl<const N: usize> Journal<N> {
     pub(crate) fn stand(&mut self, simulation: &Simulation<N>) {
         let steps = simulation.steps();
         if !self.is_whole {
-            let whole = ArmEvent::Began(Box::new(simulation.checkpoint()));
-            self.is_whole = self.say(steps, whole);
+            let whole = StepNote::Begin(Box::new(simulation.checkpoint()));
+            self.is_whole = self.say(steps, ArmEvent::Noted(whole));
         }
         let step = self.before_reset + steps;
         if self.is_whole && self.stood != Some(step) {

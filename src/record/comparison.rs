@@ -9,11 +9,11 @@ use std::io::Read;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::journal::{Note, NoteError, links_and_version, read_note};
+use super::journal::{NoteError, links_and_version, read_note};
 use super::reader::{ReadError, RecordEnding, RecordedMessage, Recording};
 use super::schema::{INPUTS, STATES};
 use super::writer::VERSION;
-use crate::math::simulation::Simulation;
+use crate::math::simulation::{Simulation, StepNote};
 use crate::protocol::wire::text::excerpt;
 
 /// Most steps between two messages of a record. On the fastest machine a tick has a tenth of that, so a record with a
@@ -236,7 +236,7 @@ impl<const N: usize> Replay<N> {
     fn input(&mut self, passage: &RecordedMessage) -> Result<(), ReplayError> {
         let InputMessage { step, input } = fields(passage)?;
         let note = read_note(&input).map_err(|why| ReplayError::Input { step, why })?;
-        if let Note::Begin(checkpoint) = note {
+        if let StepNote::Begin(checkpoint) = note {
             self.verdict.losses += u64::from(self.arm.is_some());
             self.verdict.agreed_to = step;
             self.arm = Some((Simulation::continued(&checkpoint), step));
@@ -248,14 +248,14 @@ impl<const N: usize> Replay<N> {
             return Ok(());
         };
         match note {
-            Note::Input(input) => simulation.apply(input),
-            Note::Diverged if simulation.step() => {
+            StepNote::Input(input) => simulation.apply(input),
+            StepNote::Diverged if simulation.step() => {
                 self.differs(
                     step,
                     "the next step was not finite in the record, but is finite now",
                 );
             }
-            Note::Diverged | Note::Begin(_) => {}
+            StepNote::Diverged | StepNote::Begin(_) => {}
         }
         self.verdict.inputs += 1;
         Ok(())

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::math::arm::{Arm, ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::{ArmInput, Checkpoint, ControlPeriod, Held};
+use crate::math::simulation::{ArmInput, Checkpoint, ControlPeriod, Held, StepNote};
 use crate::protocol::wire::text::{excerpt, shortened};
 
 use super::writer::VERSION;
@@ -16,17 +16,6 @@ use super::writer::VERSION;
 const MAX_WORDS: usize = 200;
 /// Most steps of a record: all numbers up to this are exact as a `float64`. A run takes years to exceed it.
 const MAX_STEPS: u64 = 1 << 53;
-
-/// An input of the arm's steps.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Note<const N: usize> {
-    /// The whole simulation, at the start of the record and after a gap.
-    Begin(Box<Checkpoint<N>>),
-    /// An external change.
-    Input(ArmInput<N>),
-    /// The next step was not finite and was not taken.
-    Diverged,
-}
 
 /// Why a text is not a note.
 #[derive(Debug, thiserror::Error)]
@@ -52,15 +41,15 @@ pub enum NoteError {
 
 /// The note as text.
 #[must_use]
-pub fn write_note<const N: usize>(note: &Note<N>) -> String {
+pub fn write_note<const N: usize>(note: &StepNote<N>) -> String {
     let (kind, value) = match note {
-        Note::Begin(simulation) => {
+        StepNote::Begin(simulation) => {
             let simulation = simulation.write();
             let begin = json!({"links": N, "version": VERSION, "simulation": simulation});
             ("begin", begin)
         }
-        Note::Diverged => ("diverged", Value::Null),
-        Note::Input(input) => match input {
+        StepNote::Diverged => ("diverged", Value::Null),
+        StepNote::Input(input) => match input {
             ArmInput::Method(method) => ("method", method.write()),
             ArmInput::Timestep(timestep) => ("timestep", timestep.write()),
             ArmInput::Arm(arm) => ("params", arm.write()),
@@ -91,19 +80,19 @@ pub(super) fn links_and_version(note: &str) -> Option<(u64, String)> {
 ///
 /// # Errors
 /// If it is not a note, or not for an arm of `N` links.
-pub fn read_note<const N: usize>(note: &str) -> Result<Note<N>, NoteError> {
+pub fn read_note<const N: usize>(note: &str) -> Result<StepNote<N>, NoteError> {
     let note: Value = serde_json::from_str(note)?;
     let mut members = note.as_object().into_iter().flatten();
     let (Some((kind, value)), None) = (members.next(), members.next()) else {
         return Err(NoteError::Kind(note.to_string()));
     };
-    Ok(Note::Input(match kind.as_str() {
+    Ok(StepNote::Input(match kind.as_str() {
         "begin" => {
             let simulation: Checkpoint<N> = Noted::read("begin", &value["simulation"])?;
             require_positive(simulation.timestep)?;
-            return Ok(Note::Begin(Box::new(simulation)));
+            return Ok(StepNote::Begin(Box::new(simulation)));
         }
-        "diverged" => return Ok(Note::Diverged),
+        "diverged" => return Ok(StepNote::Diverged),
         "method" => ArmInput::Method(Noted::read("method", value)?),
         "timestep" => {
             let timestep = Noted::read("timestep", value)?;
@@ -269,7 +258,7 @@ mod tests {
     #[test]
     fn an_input_that_no_arm_accepts_is_refused_by_its_field() {
         let simulation = Simulation::new(Arm::<2>::default(), Gains::default());
-        let begin = write_note(&Note::Begin(Box::new(simulation.checkpoint())));
+        let begin = write_note(&StepNote::Begin(Box::new(simulation.checkpoint())));
         let mut stopped: Value = serde_json::from_str(&begin).unwrap();
         stopped["begin"]["simulation"]["timestep"] = 0.into();
         assert!(read_note::<2>(&begin).is_ok());

@@ -17,7 +17,7 @@ use bytes::Bytes;
 pub use self::comparison::{
     AT_ONCE, Difference, MAX_STEPS_BETWEEN_MESSAGES, ReplayError, ReplayVerdict, replay,
 };
-pub use self::journal::{Note, NoteError, read_note, write_note};
+pub use self::journal::{NoteError, read_note, write_note};
 pub use self::reader::{ReadError, RecordEnding, RecordedMessage, Recording};
 pub use self::schema::{CALLS, INPUTS, STATES};
 pub use self::writer::{CHUNK_BYTES, McapWriter, RecordError, RunSettings};

@@ -7,7 +7,7 @@ use bytes::Bytes;
 use super::limits::MAX_RECORDED_FRAME;
 use crate::actors::arm::sim::{ArmEvent, ArmListener, StepEvent};
 use crate::actors::gateway::registry::{Tap, Tapped};
-use crate::record::{Content, Note, write_note};
+use crate::record::{Content, write_note};
 
 /// The arm's inputs and states. `put` returns whether it has accepted an entry.
 #[must_use]
@@ -15,14 +15,11 @@ pub fn arm<const N: usize>(
     mut put: impl FnMut(Content) -> bool + Send + 'static,
 ) -> ArmListener<N> {
     Box::new(move |StepEvent { step, event }| {
-        let input = |note: Note<N>| Content::Input {
-            step,
-            note: write_note(&note),
-        };
         put(match event {
-            ArmEvent::Began(checkpoint) => input(Note::Begin(checkpoint)),
-            ArmEvent::Changed(change) => input(Note::Input(change)),
-            ArmEvent::Diverged => input(Note::Diverged),
+            ArmEvent::Noted(note) => Content::Input {
+                step,
+                note: write_note(&note),
+            },
             ArmEvent::Stands { state, effort } => Content::State {
                 step,
                 position: state.position.to_vec(),

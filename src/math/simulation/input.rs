@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** a simulation with the same inputs before the same steps takes the same steps, bit for bit.
 
-use super::{ControlPeriod, Simulation};
+use super::{Checkpoint, ControlPeriod, Simulation};
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
@@ -39,6 +39,17 @@ pub enum ArmInput<const N: usize> {
     Drive(Option<[f64; N]>),
     /// Returns the arm to the starting pose.
     Reset,
+}
+
+/// An entry of the journal of a simulation's steps.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StepNote<const N: usize> {
+    /// The whole simulation, at the start of the journal and after a gap.
+    Begin(Box<Checkpoint<N>>),
+    /// An external change.
+    Input(ArmInput<N>),
+    /// The next step was not finite and was not taken.
+    Diverged,
 }
 
 impl<const N: usize> Simulation<N> {

@@ -35,7 +35,7 @@ pub use self::hold::{ControlPeriod, Held, Hold};
 pub(crate) use self::increments::add_carried;
 use self::increments::{leaves_out_first_angle, stepped};
 pub use self::increments::{state_after, step_under};
-pub use self::input::ArmInput;
+pub use self::input::{ArmInput, StepNote};
 use super::arm::{Arm, State};
 use super::dynamics::{forward_dynamics, weightless_dynamics};
 use super::integrator::Method;
