@@ -4,6 +4,7 @@
 //! the target and the setpoint with which it was accepted.
 
 use bytes::Bytes;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::arm::joint_names;
@@ -58,17 +59,25 @@ fn read_target<const N: usize>(fields: &mut Fields<'_>) -> Option<Target> {
     })
 }
 
-/// A target in the form of the messages. It has an orientation only if one was requested.
-#[must_use]
-pub fn target_message(target: &Target) -> Value {
-    let (x, y) = target.position.into();
-    match target.orientation {
-        Some(phi) => json!({"x": x, "y": y, "phi": phi}),
-        None => json!({"x": x, "y": y}),
-    }
+/// A target in the messages.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TargetMessage {
+    x: f64,
+    y: f64,
+    /// The orientation, if one was requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    phi: Option<f64>,
 }
 
-// ---- goals ----------------------------------------------------------------------------------------------------------
+impl From<&Target> for TargetMessage {
+    fn from(target: &Target) -> Self {
+        Self {
+            x: target.position.x,
+            y: target.position.y,
+            phi: target.orientation,
+        }
+    }
+}
 
 /// A goal of a client. The answer is its id, sent before its trajectory is published.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -179,25 +188,40 @@ impl<const N: usize> AcceptedGoal<N> {
     /// Its message on `/ik_action/feedback`, from the remaining distance \[m\] and the simulation time since its start
     /// \[s\].
     #[must_use]
-    pub fn feedback(&self, distance: f64, elapsed: f64) -> Value {
-        json!({
-            "goal_id": self.id,
-            "target": target_message(&self.target),
-            "positions": self.positions.as_slice(),
-            "distance_remaining": distance,
-            "elapsed": elapsed,
-        })
+    pub fn feedback(&self, distance: f64, elapsed: f64) -> impl Serialize + use<N> {
+        #[derive(Serialize)]
+        struct Feedback {
+            goal_id: String,
+            target: TargetMessage,
+            positions: Vec<f64>,
+            distance_remaining: f64,
+            elapsed: f64,
+        }
+        Feedback {
+            goal_id: self.id.clone(),
+            target: (&self.target).into(),
+            positions: self.positions.to_vec(),
+            distance_remaining: distance,
+            elapsed,
+        }
     }
 
     /// Its message on `/ik_action/result`.
     #[must_use]
-    pub fn result(&self, distance: f64, outcome: Option<Outcome>) -> Value {
-        json!({
-            "goal_id": self.id,
-            "outcome": outcome.map_or("", Outcome::name),
-            "target": target_message(&self.target),
-            "final_distance": distance,
-        })
+    pub fn result(&self, distance: f64, outcome: Option<Outcome>) -> impl Serialize + use<N> {
+        #[derive(Serialize)]
+        struct GoalResult {
+            goal_id: String,
+            outcome: &'static str,
+            target: TargetMessage,
+            final_distance: f64,
+        }
+        GoalResult {
+            goal_id: self.id.clone(),
+            outcome: outcome.map_or("", Outcome::name),
+            target: (&self.target).into(),
+            final_distance: distance,
+        }
     }
 
     /// Its setpoint as a `trajectory_msgs/msg/JointTrajectory` of one point, at rest, as soon as possible.

@@ -5,9 +5,10 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::json;
 
-use super::goals::target_message;
+use super::goals::TargetMessage;
 use super::{Address, Answered, Ask, Callable};
 use crate::math::trial::{Changes, Rejection, Settings, Status};
 use crate::protocol::catalog::Service;
@@ -99,15 +100,26 @@ impl Answered for TrialRequest {
 
 /// The message of `/ik_trial/status`.
 #[must_use]
-pub fn status_message(status: &Status) -> Value {
-    json!({
-        "running": status.running,
-        "elapsed": status.elapsed,
-        "duration": status.duration,
-        "targets_reached": status.targets_reached,
-        "target": status.target.as_ref().map(target_message),
-        "error": status.error,
-        "desired_positions": status.desired_positions,
-        "action_status": status.action_status.name(),
-    })
+pub fn status_message(status: &Status) -> impl Serialize + use<> {
+    #[derive(Serialize)]
+    struct TrialStatus {
+        running: bool,
+        elapsed: f64,
+        duration: f64,
+        targets_reached: u64,
+        target: Option<TargetMessage>,
+        error: Option<f64>,
+        desired_positions: Option<Vec<f64>>,
+        action_status: &'static str,
+    }
+    TrialStatus {
+        running: status.running,
+        elapsed: status.elapsed,
+        duration: status.duration,
+        targets_reached: status.targets_reached,
+        target: status.target.as_ref().map(TargetMessage::from),
+        error: status.error,
+        desired_positions: status.desired_positions.clone(),
+        action_status: status.action_status.name(),
+    }
 }

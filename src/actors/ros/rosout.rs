@@ -3,7 +3,7 @@
 //! **Invariant:** without subscribers no warning is stored.
 
 use actix::prelude::*;
-use serde_json::json;
+use serde::Serialize;
 use tokio::sync::mpsc;
 use tracing::Level;
 
@@ -82,18 +82,27 @@ fn message((metadata, msg): Warning, time: f64) -> Publish {
     // The levels are those of ROS.
     let is_error = *metadata.level() == Level::ERROR;
     let level = if is_error { 40 } else { 30 };
-    let message = move || {
-        json!({
-            "stamp": Stamp::from_seconds(time),
-            "level": level,
-            "name": node_of(metadata.target()),
-            "msg": msg,
-            "file": metadata.file().unwrap_or_default(),
-            "function": "",
-            "line": metadata.line().unwrap_or_default(),
-        })
-    };
-    Publish::made(Topic::Rosout, message)
+    Publish::made(Topic::Rosout, move || LogMessage {
+        stamp: Stamp::from_seconds(time),
+        level,
+        name: node_of(metadata.target()),
+        msg,
+        file: metadata.file().unwrap_or_default(),
+        function: "",
+        line: metadata.line().unwrap_or_default(),
+    })
+}
+
+/// `rcl_interfaces/msg/Log`. The function is not known.
+#[derive(Serialize)]
+struct LogMessage {
+    stamp: Stamp,
+    level: u8,
+    name: &'static str,
+    msg: String,
+    file: &'static str,
+    function: &'static str,
+    line: u32,
 }
 
 /// The actor of the reporting module: `registry` for `pendularm::actors::gateway::registry::ops`.

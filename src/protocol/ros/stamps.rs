@@ -11,7 +11,7 @@ use crate::protocol::catalog::types::Type;
 use crate::protocol::names;
 use crate::protocol::wire::json;
 
-/// The end of the names of a stamp's two numbers. No other member ends like this.
+/// The end of the names of a stamp's two numbers.
 const SECONDS: &str = "sec\":";
 
 /// Whether `asked` is the ROS 1 name of a ROS 2 type: `std_msgs/Header` for `std_msgs/msg/Header`.
@@ -47,8 +47,14 @@ pub fn with_ros1_names(frame: &[u8]) -> Bytes {
         let is_part = |character: char| character.is_ascii_digit() || character == '-';
         let end = behind.find(|character| !is_part(character));
         let (number, rest) = behind.split_at(end.unwrap_or(behind.len()));
-        let is_rest_of_nanosec = text.ends_with("nano");
-        let name = if is_rest_of_nanosec { "nsecs" } else { "secs" };
+        let name = match text.as_str() {
+            before if before.ends_with("\"nano") => "nsecs",
+            before if before.ends_with('"') => "secs",
+            _ => {
+                text.extend([SECONDS, behind]);
+                continue;
+            }
+        };
         text.extend([SECONDS, number, ",\"", name, "\":", number, rest]);
     }
     text.shrink_to_fit();
@@ -71,7 +77,7 @@ mod tests {
             r#""nanosec":30,"nsecs":30,"sec":2,"secs":2"#,
         );
         assert_eq!(with_ros1_names(frame.as_bytes()), expected.as_bytes());
-        for none in [&b""[..], b"{}", b"{\"second\":1}"] {
+        for none in [&b""[..], b"{}", b"{\"second\":1,\"msec\":2}"] {
             assert_eq!(with_ros1_names(none), none);
         }
     }
