@@ -9,7 +9,7 @@ use crate::virtual_time::{Gateway, Peer, WIDE};
 use actix::prelude::*;
 use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::gateway::limits::{CLIENT_BYTES, MAX_MEMORY};
+use pendularm::actors::gateway::limits::{CLIENT_BYTES, MAX_LONG_FORMS, MAX_MEMORY};
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::resources::memory::{LONG_ANSWERS, LONG_FRAMES, Memory, SHORT};
 use serde_json::json;
@@ -21,8 +21,9 @@ const STEP: &str = "/arm_sim/integration_step";
 /// `limits.rs` asserts that the sum is within the limit.
 #[test]
 fn places_and_pools_have_the_documented_sizes() {
-    const { assert!(CLIENT_BYTES == 1728 * 1024 && MAX_MEMORY == 624 * MIB) };
+    const { assert!(CLIENT_BYTES == 1728 * 1024 && MAX_MEMORY == 648 * MIB) };
     const { assert!(LONG_FRAMES == 3 && LONG_ANSWERS == 96 * MIB && SHORT == 64 * 1024) };
+    const { assert!(MAX_LONG_FORMS == 4) };
 }
 
 /// A gateway with real computations, on real threads: so this test is in real time.

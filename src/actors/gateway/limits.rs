@@ -13,7 +13,7 @@ const KIB: usize = 1024;
 
 /// Largest resident size of the program with the default number of places \[bytes\]. It excludes the system's socket
 /// buffers.
-pub const MAX_MEMORY: usize = 624 * KIB * KIB;
+pub const MAX_MEMORY: usize = 648 * KIB * KIB;
 /// Most bytes of one client, without long frames and answers. The sum has its input (received bytes and a frame),
 /// the pieces of a message, and topic messages that wait or are being written. Responses and computations count with
 /// one more than may wait. The entries of the registry, a WebSocket's buffers and the idle connection are included.
@@ -26,9 +26,12 @@ pub const CLIENT_BYTES: usize = 2 * MEDIUM
     + 2 * SHORT
     + MAX_KEPT
     + 96 * KIB;
-/// Most bytes of a long frame. It exists as received bytes, as a message, as text, as a value, as the forwarded frame,
-/// and as that frame in another form.
-pub const LONG_FRAME_BYTES: usize = 6 * MAX_FRAME;
+/// Most forms of a published message that is longer than [`MEDIUM`]: plain, or as subscribers have requested it.
+/// Subscribers who requested a further form do not get it.
+pub const MAX_LONG_FORMS: usize = 4;
+/// Most bytes of a long frame. It exists as received bytes, as a message, as text, as a value, and in the forms in
+/// which it is sent.
+pub const LONG_FRAME_BYTES: usize = (4 + MAX_LONG_FORMS) * MAX_FRAME;
 /// Bytes of the program itself.
 const PROGRAM_BYTES: usize = 24 * KIB * KIB;
 const _: () = assert!(

@@ -226,7 +226,7 @@ fn take_entries(
         {
             Ok((entry, _)) => {
                 match writer.write(&entry) {
-                    // A frame that cannot be read back is a fault of the runtime, but does not end the record.
+                    // A frame that cannot be read back does not end the record.
                     Err(error @ RecordError::Frame(_)) => {
                         tracing::warn!(%error, "a message is not recorded");
                     }

@@ -14,6 +14,7 @@ use super::forms::{Made, ToEncode};
 use super::refusal::Refusal;
 use super::{FrameOrigin, Handled, Registry, SetTap, Subscriber, Subscription, Tapped, ToClient};
 use crate::actors::ConnectionId;
+use crate::actors::gateway::limits::MAX_LONG_FORMS;
 use crate::actors::node::{Done, Interest, Publish, TopicMessage, guard};
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::actors::resources::memory::cover_message;
@@ -323,7 +324,11 @@ impl Registry {
             };
             if is_sent_plain(encoding, frame.len()) {
                 deliver(subscriber, frame);
-            } else if !others.contains(&(spelling, encoding)) {
+            } else if others.contains(&(spelling, encoding)) {
+                // It gets the same form.
+            } else if self.permit.is_some() && plain.len() + others.len() >= MAX_LONG_FORMS {
+                self.gauges.add_dropped(1);
+            } else {
                 others.push((spelling, encoding));
                 let message = self.to_encode(spelling, frame, encoding);
                 if message.is_long() {
