@@ -5,7 +5,7 @@
 use std::future::pending;
 
 use bytes::BytesMut;
-use tokio::sync::mpsc::{self, UnboundedSender};
+use tokio::sync::mpsc::{self, Sender};
 use tokio::sync::oneshot;
 use tokio::time::Instant;
 
@@ -23,13 +23,13 @@ pub(super) type Newcomer<'a> = (HeldSlot<'a>, Option<Refused>);
 /// Asks the session whether a client is admitted. The session takes only the first request of a client without a place.
 struct HttpGate<'a> {
     session: &'a ClientSession,
-    requests: UnboundedSender<oneshot::Sender<Result<(), String>>>,
+    requests: Sender<oneshot::Sender<Result<(), String>>>,
 }
 
 impl Gate for HttpGate<'_> {
     async fn admit(&self) -> Result<(), String> {
         let (reply, answer) = oneshot::channel();
-        let _ = self.requests.send(reply);
+        let _ = self.requests.send(reply).await;
         answer.await.unwrap_or(Ok(()))
     }
 
@@ -52,7 +52,7 @@ impl ClientSession {
             Ok(place) => (Some(place), None),
             Err(newcomer) => (None, Some(newcomer)),
         };
-        let (requests, mut asked) = mpsc::unbounded_channel();
+        let (requests, mut asked) = mpsc::channel(1);
         let gate = HttpGate {
             session: self,
             requests,
