@@ -20,10 +20,9 @@ check=
 [ -n "$check" ] || cargo mutants --version >/dev/null 2>&1 || fail "needs cargo-mutants: cargo install --locked cargo-mutants"
 
 cd "$root"
-# A property test has 64 random cases, without shrinking.
 export PROPTEST_CASES=64 PROPTEST_MAX_SHRINK_ITERS=0
 
-# Tries mutants with these options. What `--cargo-arg` gives is for builds too; else they would have all tests.
+# Tries mutants with these options. `--cargo-arg` selects the tests of builds too, which would have all of the package.
 try() {
     local status=0
     cargo mutants --output "$out" --colors never "${files[@]}" --cargo-arg=--locked "$@" || status=$?
@@ -33,15 +32,16 @@ try() {
 
 low=0
 for layer in "${layers[@]}"; do
-    folders=("$layer") tests=(--lib --test="$layer") quick=(--test-package pendularm-actor-tests --cargo-arg=--test="$layer" -- --)
+    folders=("$layer") tests=(--package=pendularm-actor-tests --lib --test="$layer")
+    quick=(--test-package pendularm-actor-tests --cargo-arg={--package=pendularm-actor-tests,--test="$layer"} -- --)
     case $layer in
         # Without tests that are long without optimising.
         math) quick=(--test-package pendularm --no-default-features --features batch --cargo-arg=--test=math -- --
             --skip default_gains --skip a_lane_has_the_bits --skip rounding_errors_of_steps --skip expression::size --skip every_angle_is_within) ;;
-        protocol) quick+=(--skip longest_message) ;;
+        protocol) tests+=(--test=actors) ;; # has the tests of the outbox over time
         actors) folders+=(live services web) tests+=(--test=wire) ;;
     esac
-    if [ -n "$check" ]; then cargo test --locked --no-run "${tests[@]}"; continue; fi
+    if [ -n "$check" ]; then cargo test --locked --no-run --package=pendularm "${tests[@]}"; continue; fi
     files=() out=target/mutants/$layer
     for folder in "${folders[@]}"; do files+=(--file "src/$folder/**"); done
     rm -rf "$out"
