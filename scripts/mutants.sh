@@ -2,9 +2,9 @@
 # Makes single small changes to the code of a layer (cargo-mutants), and counts the changes that a test notices.
 # Usage: scripts/mutants.sh [math|protocol|actors] [--check] [options of cargo mutants, such as --re pid.rs]
 #
-# A mutant first meets the layer's quick tests, built without optimising: some seconds each, half a minute for actors. The
+# A mutant of math or protocol first meets the layer's quick tests, built without optimising: some seconds each. The
 # survivors are tried again with all tests of the layer. `actors` is src/actors with src/live, src/services and src/web;
-# its other tests take minutes, so select a part: `--re ':\d*7:\d+: '` has the lines that end in 7. Outcomes are in
+# its tests take a minute or two, so select a part: `--re ':\d*7:\d+: '` has the lines that end in 7. Outcomes are in
 # target/mutants/<layer>. `--check` only builds the layer's tests. It fails below 90 %: (caught + timed out) / (all -
 # those that do not compile).
 set -euo pipefail
@@ -46,7 +46,7 @@ for layer in "${layers[@]}"; do
     for folder in "${folders[@]}"; do files+=(--file "src/$folder/**"); done
     rm -rf "$out"
     mkdir -p "$out"
-    try "$@" --cargo-arg=--config=profile.dev.package.pendularm.opt-level=0 "${quick[@]}"
+    [ "$layer" = actors ] || try "$@" --cargo-arg=--config=profile.dev.package.pendularm.opt-level=0 "${quick[@]}"
     # `default_gains` has many long runs.
     try "$@" --iterate --test-package pendularm,pendularm-actor-tests "${tests[@]/#/--cargo-arg=}" -- -- --skip default_gains
     # The first trial's outcomes are in `mutants.out.old`.
