@@ -20,6 +20,7 @@ use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::actors::resources::memory::cover_message;
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::{Direction, Topic};
+use crate::protocol::limits::MEDIUM;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
 use crate::protocol::op::{Compression, Encoding, Subscribe};
@@ -324,11 +325,11 @@ impl Registry {
             };
             if is_sent_plain(encoding, frame.len()) {
                 deliver(subscriber, frame);
-            } else if others.contains(&(spelling, encoding)) {
-                // It gets the same form.
-            } else if self.permit.is_some() && plain.len() + others.len() >= MAX_LONG_FORMS {
-                self.gauges.add_dropped(1);
-            } else {
+            } else if !others.contains(&(spelling, encoding)) {
+                if frame.len() > MEDIUM && plain.len() + others.len() >= MAX_LONG_FORMS {
+                    self.gauges.add_dropped(1);
+                    continue;
+                }
                 others.push((spelling, encoding));
                 let message = self.to_encode(spelling, frame, encoding);
                 if message.is_long() {
