@@ -33,12 +33,12 @@ try() {
 low=0
 for layer in "${layers[@]}"; do
     folders=("$layer") tests=(--package=pendularm-actor-tests --lib --test="$layer")
-    quick=(--test-package pendularm-actor-tests --cargo-arg={--package=pendularm-actor-tests,--test="$layer"} -- --)
     case $layer in
         # Without tests that are long without optimising.
         math) quick=(--test-package pendularm --no-default-features --features batch --cargo-arg=--test=math -- --
             --skip default_gains --skip a_lane_has_the_bits --skip rounding_errors_of_steps --skip expression::size --skip every_angle_is_within) ;;
-        protocol) tests+=(--test=actors) ;; # has the tests of the outbox over time
+        protocol) tests+=(--test=actors) # has the tests of the outbox over time
+            quick=(--test-package pendularm-actor-tests --cargo-arg={--package=pendularm-actor-tests,--test=protocol}) ;;
         actors) folders+=(live services web) tests+=(--test=wire) ;;
     esac
     if [ -n "$check" ]; then cargo test --locked --no-run --package=pendularm "${tests[@]}"; continue; fi
