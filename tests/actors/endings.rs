@@ -1,4 +1,4 @@
-//! Thousands of calls and goals that end at one instant: other tasks still have turns.
+//! Thousands of calls and goals that end at one instant: other tasks still have turns. A caller that has gone.
 //!
 //! **Invariant:** the share of other tasks is counted in their turns.
 
@@ -83,4 +83,44 @@ fn goals_of_a_disconnected_action_server() {
     let goal = |n| json!({"op": "send_action_goal", "action": "/a", "action_type": "t/A", "id": n, "args": {}});
     let aborted = |result: &Value| result["op"] == "action_result" && result["status"] == 6;
     assert_ends_in_turns(goal, async |provider| drop(provider), aborted);
+}
+
+/// The client's pipe stays open: only its socket shows that nobody waits for the answer.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_caller_that_has_stopped_sending_is_kept_until_its_socket_is_closed() {
+    use std::net::{TcpListener, TcpStream};
+    use std::sync::Arc;
+
+    use pendularm::actors::gateway::connection::{Connection, Ends};
+    use tokio::io::{AsyncWriteExt, duplex};
+    use tokio::time::sleep;
+
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut provider = gateway.connect(WIDE);
+        provider.provide("/s").await;
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let socket = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let (accepted, peer) = listener.accept().unwrap();
+        let local = accepted.local_addr().unwrap();
+        let (mut caller, theirs) = duplex(WIDE);
+        let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
+        Connection::start_with(
+            Arc::default(),
+            Ends { local, peer },
+            theirs,
+            registry,
+            gauges,
+        );
+        let call = format!("{}\n", call(1));
+        caller.write_all(call.as_bytes()).await.unwrap();
+        caller.shutdown().await.unwrap();
+        provider.receive().await;
+        sleep(Duration::from_secs(5)).await;
+        assert_eq!(gateway.gauges.connections(), 2, "it may still read");
+        drop(socket);
+        sleep(Duration::from_secs(1)).await;
+        assert_eq!(gateway.gauges.connections(), 1);
+    });
 }

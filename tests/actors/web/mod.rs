@@ -34,3 +34,5 @@ async fn open(gateway: &Gateway, room: usize) -> Client<DuplexStream> {
 
 /// Most bytes that are read or written before other tasks have a turn.
 const TURN: usize = 64 * 1024;
+/// Most frames that are read before other tasks have a turn.
+const FRAMES_IN_A_TURN: usize = 64;
