@@ -1,4 +1,5 @@
-//! Thousands of calls and goals that end at one instant: other tasks still have turns. A caller that has gone.
+//! Thousands of calls and goals that end at one instant: other tasks still have turns. A caller that has gone, and one
+//! that reads nothing.
 //!
 //! **Invariant:** the share of other tasks is counted in their turns.
 
@@ -6,7 +7,10 @@ use std::time::Duration;
 
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE, turns_of_others};
+use pendularm::actors::gateway::registry::FinishAll;
 use serde_json::{Value, json};
+use tokio::io::AsyncWriteExt;
+use tokio::time::{sleep, timeout};
 
 const CLIENTS: usize = 16;
 /// The number of calls or goals of each client.
@@ -93,8 +97,7 @@ fn a_caller_that_has_stopped_sending_is_kept_until_its_socket_is_closed() {
     use std::sync::Arc;
 
     use pendularm::actors::gateway::connection::{Connection, Ends};
-    use tokio::io::{AsyncWriteExt, duplex};
-    use tokio::time::sleep;
+    use tokio::io::duplex;
 
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
@@ -122,5 +125,25 @@ fn a_caller_that_has_stopped_sending_is_kept_until_its_socket_is_closed() {
         drop(socket);
         sleep(Duration::from_secs(1)).await;
         assert_eq!(gateway.gauges.connections(), 1);
+    });
+}
+
+/// The answers would wait in memory.
+#[test]
+fn a_client_that_reads_nothing_is_not_read_when_the_runtime_ends() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut client = gateway.connect(8 * 1024);
+        let calls = format!("{}\n", call(1)).repeat(10_000);
+        for is_ending in [false, true] {
+            if is_ending {
+                gateway.registry.send(FinishAll).await.unwrap();
+            }
+            let all = client.stream().write_all(calls.as_bytes());
+            let sent = timeout(Duration::from_secs(1), all).await;
+            assert!(sent.is_err(), "{is_ending}: all of it was read");
+        }
+        sleep(Duration::from_secs(10)).await;
+        assert_eq!(gateway.gauges.connections(), 0);
     });
 }

@@ -248,7 +248,8 @@ impl ClientReader {
             Some(FramePart::Error(error, start)) => {
                 self.perform(client, op::read_start(&start, &error), 0)
             }
-            // A client with messages is read until it answers the close frame.
+            // The answers of a client that reads nothing would wait in memory. A client with messages is read until it
+            // answers the close frame.
             None if client.is_finishing && !takes_binary => {
                 self.has_ended = true;
                 self.chunk.clear();
