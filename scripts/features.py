@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Builds the program with and without its features and prints the table of docs/development.md: size, crates, processor time of a build.
+"""Builds the program with and without its features and prints a table: crates, size of the program, processor time of a build.
 
 Each build starts from scratch in a folder that is deleted afterwards. `library` or `program` selects rows. `--crates`
-omits the builds. `--keep` writes the table into that document, between its two marks.
+omits the builds. `--keep` writes the columns that no machine changes into docs/development.md, between its two marks.
 """
 
 import os
@@ -29,8 +29,8 @@ BUILDS = (
 
 
 def selection(features):
-    """Flags for exactly these features; the default ones for `None`."""
-    return [] if features is None else ["--no-default-features", "--features", features]
+    """Flags for this package alone with exactly these features; the default ones for `None`."""
+    return ["--package", "pendularm"] + ([] if features is None else ["--no-default-features", "--features", features])
 
 
 def crates(features):
@@ -70,7 +70,8 @@ def main():
     text = table("--crates" not in sys.argv)
     print(text, end="")
     if "--keep" in sys.argv:
-        PAPER.write_text(MARKS.sub(lambda marks: marks[1] + text + marks[2], PAPER.read_text()))
+        kept = table(builds=False)
+        PAPER.write_text(MARKS.sub(lambda marks: marks[1] + kept + marks[2], PAPER.read_text()))
 
 
 main()

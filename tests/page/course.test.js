@@ -34,6 +34,12 @@ test("no task is done before anything is done, and each can be", () => {
   }
 });
 
+test("every method but Euler keeps the energy", () => {
+  const { done } = STEPS.find(({ id }) => id === "energy").task;
+  const kept = ["euler", "midpoint", "verlet", "rk4"].map((method) => done({ ...nothingSeen(), methods: new Set(["euler", method]) }));
+  assert.deepEqual(kept, [false, true, true, true]);
+});
+
 test("every step has a scene for two and for three links", () => {
   for (const { id, scene } of STEPS) for (const links of [2, 3]) assert.equal(scene(links).gains.kp.length, links, id);
 });

@@ -213,9 +213,9 @@ def rollout(
 ) -> Rollout:
     """Runs an arm offline with the live arm's own steps, as ``/study/rollout`` does.
 
-    It begins at `q0` [rad] and `qdot0` [rad/s] (zeros by default). `duration` [s] is rounded to the nearest number of
-    timesteps, at least one. The result has `samples`, including start and end, or every step if there are fewer.
-    Without `gains` the arm is free, and a `setpoint` is refused. A missing member of `gains` is zeros. With
+    It begins at `q0` [rad] and `qdot0` [rad/s] (zeros by default). `duration` [s], at least one timestep, is rounded
+    to the nearest number of timesteps. The result has `samples`, including start and end, or every step if there are
+    fewer. Without `gains` the arm is free, and a `setpoint` is refused. A missing member of `gains` is zeros. With
     `reference` the run is compared with the true motion under the same held control law, and with the loop whose law
     acts at every instant. The law runs once per `control_period` [s], 0 for every step.
     """

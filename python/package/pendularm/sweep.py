@@ -147,7 +147,7 @@ def sweep(
     `q0` [rad] and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s],
     `method`, `control_period` [s] and `control_delay`. `grid` has a sequence for each setting that varies. Others are
     keyword arguments, and a missing one has the value of a fresh runtime. Without `controller` the controller is off.
-    Every run lasts `duration` [s], rounded to the nearest number of timesteps, at least one. It has `samples`,
+    Every run lasts `duration` [s], at least one timestep, rounded to the nearest number of timesteps. It has `samples`,
     including start and end.
 
     `metric` is `settling_time` [s], `final_error` [rad], `largest_effort` [N m], `energy_drift` [J], or a function of

@@ -31,6 +31,26 @@ fn the_licence_files_are_those_that_the_manifest_names() {
     assert!(text("LICENSE-APACHE").contains("Apache License"));
 }
 
+#[test]
+fn the_papers_count_the_crates_of_each_build() {
+    let root = env!("CARGO_MANIFEST_DIR");
+    let mut count = Command::new("python3");
+    count.args(["scripts/features.py", "--crates"]);
+    count.current_dir(root).env("CARGO", env!("CARGO"));
+    // After a build only the packages for this platform are sure to be present.
+    count.env("CARGO_NET_OFFLINE", "true");
+    let Ok(count) = count.output() else {
+        assert!(std::env::var_os("CI").is_none(), "python3 is missing");
+        return;
+    };
+    let said = String::from_utf8_lossy(&count.stderr);
+    assert!(count.status.success(), "{said}");
+    let paper = text("docs/development.md");
+    let (_, kept) = paper.split_once("<!-- scripts/features.py -->\n").unwrap();
+    let (kept, _) = kept.split_once("<!-- end -->").unwrap();
+    assert_eq!(String::from_utf8_lossy(&count.stdout), kept);
+}
+
 /// `rust-version` is a promise to users with an older compiler, so no package may need a newer one.
 #[test]
 fn no_dependency_asks_for_a_newer_compiler_than_we_do() {
