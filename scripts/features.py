@@ -70,8 +70,7 @@ def main():
     text = table("--crates" not in sys.argv)
     print(text, end="")
     if "--keep" in sys.argv:
-        kept = table(builds=False)
-        PAPER.write_text(MARKS.sub(lambda marks: marks[1] + kept + marks[2], PAPER.read_text()))
+        PAPER.write_text(MARKS.sub(lambda marks: marks[1] + table(builds=False) + marks[2], PAPER.read_text()))
 
 
 main()

@@ -31,6 +31,8 @@ fn the_licence_files_are_those_that_the_manifest_names() {
     assert!(text("LICENSE-APACHE").contains("Apache License"));
 }
 
+/// Another platform has other crates.
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 #[test]
 fn the_papers_count_the_crates_of_each_build() {
     let root = env!("CARGO_MANIFEST_DIR");
