@@ -15,7 +15,7 @@ use crate::protocol::catalog::Service;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Obstacle {
     /// Its simulation has diverged.
-    #[error("the arm has diverged and does not move until {} is called", Service::Reset.name())]
+    #[error("the arm has diverged and does not move; {} clears this", Service::Reset.name())]
     Diverged,
     /// Its controller is off.
     #[error(

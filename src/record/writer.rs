@@ -4,6 +4,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
@@ -64,10 +66,28 @@ impl From<McapError> for RecordError {
 
 /// Writes entries into a file.
 pub struct McapWriter<W: Write> {
-    writer: Writer<NoSeek<W>>,
+    writer: Writer<NoSeek<Counted<W>>>,
     channels: HashMap<&'static str, Channel>,
     messages: u64,
-    bytes: u64,
+    bytes: Arc<AtomicU64>,
+}
+
+/// A file with the number of its bytes.
+struct Counted<W> {
+    file: W,
+    bytes: Arc<AtomicU64>,
+}
+
+impl<W: Write> Write for Counted<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        self.bytes.fetch_add(written as u64, Ordering::Relaxed);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
 }
 
 struct Channel {
@@ -104,7 +124,12 @@ impl<W: Write> McapWriter<W> {
             .chunk_size(Some(CHUNK_BYTES))
             // A chunk is kept in memory until it is whole, so the file is always the beginning of a valid one.
             .disable_seeking(true);
-        let mut writer = options.create(NoSeek::new(file))?;
+        let bytes = Arc::default();
+        let counted = Counted {
+            file,
+            bytes: Arc::clone(&bytes),
+        };
+        let mut writer = options.create(NoSeek::new(counted))?;
         let facts = [
             ("version", VERSION.to_owned()),
             ("links", settings.links.to_string()),
@@ -129,7 +154,7 @@ impl<W: Write> McapWriter<W> {
             writer,
             channels: HashMap::new(),
             messages: 0,
-            bytes: 0,
+            bytes,
         })
     }
 
@@ -199,9 +224,9 @@ impl<W: Write> McapWriter<W> {
     /// If the file cannot be written.
     pub fn finish(mut self) -> Result<W, RecordError> {
         self.writer.finish()?;
-        let mut file = self.writer.into_inner().into_inner();
-        file.flush()?;
-        Ok(file)
+        let mut counted = self.writer.into_inner().into_inner();
+        counted.flush()?;
+        Ok(counted.file)
     }
 
     /// Messages written so far.
@@ -210,10 +235,10 @@ impl<W: Write> McapWriter<W> {
         self.messages
     }
 
-    /// Bytes of these messages.
+    /// Length of the file so far, in whole chunks.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.bytes
+        self.bytes.load(Ordering::Relaxed)
     }
 
     fn put(
@@ -245,7 +270,6 @@ impl<W: Write> McapWriter<W> {
         };
         self.writer.write_to_known_channel(&header, data)?;
         self.messages += 1;
-        self.bytes += data.len() as u64;
         Ok(())
     }
 }

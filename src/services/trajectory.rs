@@ -120,7 +120,7 @@ impl<const N: usize> FollowPath<N> {
             on_the_way: tolerance(&on_the_way, "path_tolerance", [None; 2])?,
             at_the_end: tolerance(&at_the_end, "goal_tolerance", default)?,
             patience: match patience {
-                Some(raw) => match seconds(raw, "goal_time_tolerance", Bound::Finite)? {
+                Some(raw) => match seconds(raw, "goal_time_tolerance")? {
                     0.0 => GOAL_TIME,
                     none if none < 0.0 => f64::INFINITY,
                     patience => patience,
@@ -161,13 +161,17 @@ fn point<const N: usize>(
     let [positions, velocities, time] = members(raw, field, &names)?;
     let named = |name: &str| format!("{field}.{name}");
     let positions = required(positions, &named("positions"))?;
-    let time = required(time, &named("time_from_start"))?;
+    let of_time = named("time_from_start");
+    let time = seconds(required(time, &of_time)?, &of_time)?;
+    if time < 0.0 {
+        return Err(RejectedField::refused(&of_time, &"must be at least 0 s"));
+    }
     let values = |raw: &RawValue, name: &str| {
         let values = numbers(raw, &named(name))?;
         Ok(by_joint(order, &values))
     };
     Ok(Waypoint {
-        time: seconds(time, &named("time_from_start"), Bound::NonNegative)?,
+        time,
         position: values(positions, "positions")?,
         // An empty array counts as missing in a ROS message.
         velocity: velocities
@@ -177,14 +181,15 @@ fn point<const N: usize>(
     })
 }
 
-/// A duration in seconds, under the names of ROS 2 or of ROS 1: the sum of its parts, each within `bound`.
-fn seconds(raw: &RawValue, field: &str, bound: Bound) -> Result<f64, RejectedField> {
-    let [sec, nanosec, secs, nsecs] =
-        json::members(raw.get(), &["sec", "nanosec", "secs", "nsecs"])
+/// A duration in seconds: the sum of its parts, each under its name of ROS 2 or of ROS 1.
+fn seconds(raw: &RawValue, field: &str) -> Result<f64, RejectedField> {
+    let part = |name: &str, of_ros_1: &str| {
+        let [value, other] = json::members(raw.get(), &[name, of_ros_1])
             .map_err(|_| mistyped(field, "an object with sec and nanosec", raw))?;
-    let seconds = number_or_zero(sec.or(secs), &format!("{field}.sec"), bound)?;
-    let nanoseconds = number_or_zero(nanosec.or(nsecs), &format!("{field}.nanosec"), bound)?;
-    let sum = seconds + 1e-9 * nanoseconds;
+        let name = if value.is_some() { name } else { of_ros_1 };
+        number_or_zero(value.or(other), &format!("{field}.{name}"))
+    };
+    let sum = part("sec", "secs")? + 1e-9 * part("nanosec", "nsecs")?;
     if !sum.is_finite() {
         let why = "must be a finite number of seconds";
         return Err(RejectedField::refused(field, &why));
@@ -220,7 +225,7 @@ fn tolerance<const N: usize>(
             (of_position, "position", &mut tolerance.position, position),
             (of_velocity, "velocity", &mut tolerance.velocity, velocity),
         ] {
-            let value = number_or_zero(raw, &format!("{field}.{name}"), Bound::Finite)?;
+            let value = number_or_zero(raw, &format!("{field}.{name}"))?;
             if let Some(one) = limits.get_mut(joint) {
                 *one = limit(value, default);
             }
@@ -248,8 +253,8 @@ fn members<'a, const M: usize>(
     json::members(raw.get(), names).map_err(|_| mistyped(field, "an object", raw))
 }
 
-fn number_or_zero(raw: Option<&RawValue>, field: &str, bound: Bound) -> Result<f64, RejectedField> {
-    raw.map_or(Ok(0.0), |raw| finite(raw, bound))
+fn number_or_zero(raw: Option<&RawValue>, field: &str) -> Result<f64, RejectedField> {
+    raw.map_or(Ok(0.0), |raw| finite(raw, Bound::Finite))
         .map_err(|reason| RejectedField::refused(field, &reason))
 }
 

@@ -120,14 +120,23 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     if task.duration.is_nan() || task.duration > MAX_DURATION {
         return Err(PlanError::TooLong(task.duration));
     }
-    let reference = Reference::known_to(task).await?;
-    let mut candidates: Vec<Candidate> = Vec::new();
-    let (mut longest_stable, mut has_run) = (0.0_f64, false);
+    let mut loops = Vec::new();
     for method in Method::ALL.into_iter().rev() {
         pause().await;
         let control = task.control.with_method(method);
-        let most = longest_timestep(&control).await;
-        longest_stable = longest_stable.max(most);
+        loops.push((control, longest_timestep(&control).await));
+    }
+    let longest_stable = loops.iter().fold(0.0_f64, |most, (_, one)| most.max(*one));
+    // The motion of such a loop is not known either, for this reason.
+    if longest_stable <= 0.0 {
+        return Err(PlanError::Unstable);
+    }
+    let reference = Reference::known_to(task).await?;
+    let mut candidates: Vec<Candidate> = Vec::new();
+    let mut has_run = false;
+    for (control, most) in loops {
+        pause().await;
+        let method = control.method;
         let least = count::whole((reference.whole / most * (1.0 - count::ROUNDING)).ceil());
         // The number of steps that costs less than the best run so far.
         let cheapest = candidates.iter().map(|one| one.evaluations).min();
@@ -148,10 +157,8 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     let Some(&best) = candidates.last() else {
         return Err(if has_run {
             PlanError::NotFound(task.error)
-        } else if longest_stable > 0.0 {
-            PlanError::TooManySteps(longest_stable)
         } else {
-            PlanError::Unstable
+            PlanError::TooManySteps(longest_stable)
         });
     };
     Ok(Planned {

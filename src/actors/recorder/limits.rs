@@ -12,7 +12,7 @@ pub const MAX_WAITING_BYTES: usize = 16 * 1024 * 1024;
 pub const MAX_RECORDED_FRAME: usize = 1024 * 1024;
 /// Time between two flushes to the file. A killed program loses at most this much of a record.
 pub const FLUSH_PERIOD: Duration = Duration::from_secs(1);
-/// Longest record that a client has started: about nine hours of an idle arm.
+/// Longest record that a client has started: about six hours of an idle arm.
 pub const MAX_RECORD_BYTES: u64 = 1024 * 1024 * 1024;
 /// Most records in the folder before a client starts another.
 pub const MAX_RECORDS: usize = 100;

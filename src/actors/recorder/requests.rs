@@ -42,7 +42,7 @@ pub struct Recorded {
     pub file: String,
     /// Messages in it.
     pub messages: u64,
-    /// Bytes of these messages.
+    /// Length of the file in bytes.
     pub bytes: u64,
     /// Messages that were dropped, because the file was slow.
     pub dropped: u64,

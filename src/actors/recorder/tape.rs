@@ -187,13 +187,16 @@ fn write(
     let file = file_name(&target.path);
     let outcome = take_entries(&mut writer, queue, counts, target);
     counts.is_over.store(true, Ordering::Relaxed);
-    let recorded = Recorded {
+    let mut recorded = Recorded {
         messages: writer.messages(),
         bytes: writer.bytes(),
         dropped: counts.dropped.load(Ordering::Relaxed),
         file,
     };
-    let finished = outcome.and_then(|is_last| writer.finish().map(|_| is_last));
+    let finished = outcome.and_then(|is_last| {
+        recorded.bytes = writer.finish()?.get_ref().metadata()?.len();
+        Ok(is_last)
+    });
     match finished {
         Ok(true) => {}
         Ok(false) => {
@@ -325,15 +328,16 @@ mod tests {
         let settings = RunSettings { links: 2, seed: 0 };
         let target = TapeTarget {
             path: path.clone(),
-            limit: Some(1000),
+            limit: Some(100_000),
         };
         let begun = begin(target, settings, move || tell.send(()).unwrap());
         let Begun { tape, end } = begun.blocking_recv().unwrap().unwrap();
         while tape.put(input()) {}
         heard.recv().unwrap();
         let recorded = end.blocking_recv().unwrap();
+        assert_eq!(recorded.bytes, fs::metadata(&path).unwrap().len());
         assert!(
-            recorded.bytes >= 1000 && recorded.bytes < 1100,
+            recorded.bytes >= 100_000 && recorded.bytes < 200_000,
             "{recorded:?}"
         );
         let mut recording = crate::record::Recording::new(File::open(&path).unwrap());

@@ -191,6 +191,10 @@ impl MessageReader {
         let Some((length, mut mask, size)) = length_and_mask(&self.input) else {
             return false;
         };
+        // The first bit of a length is zero.
+        if length.leading_zeros() == 0 {
+            return self.violated();
+        }
         if opcode < opcode::CLOSE {
             if (opcode == opcode::CONTINUATION) != self.is_open {
                 return self.violated();

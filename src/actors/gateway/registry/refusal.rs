@@ -13,7 +13,7 @@ pub(crate) enum Refusal {
     RuntimeTopic(String),
     #[error(
         "this connection keeps too much: its subscriptions, advertisements, services, and waiting calls and goals may \
-         take {MAX_KEPT} bytes. Each takes {ENTRY_BYTES} bytes and three times its names"
+         take {MAX_KEPT} bytes. Each takes {ENTRY_BYTES} bytes and three times its names and ids"
     )]
     TooMuchKept,
     #[error(
@@ -34,8 +34,8 @@ pub(crate) enum Refusal {
     Unreadable(Problem),
     #[error("the answer of {0} was discarded: {1}")]
     BadAnswer(String, Box<Self>),
-    #[error("args must be an object or an array")]
-    BadArguments,
+    #[error("args {0}")]
+    BadArguments(String),
     #[error(transparent)]
     NoService(#[from] NoService),
     #[error("the provider of {0} is gone")]

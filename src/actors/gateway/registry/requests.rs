@@ -20,6 +20,7 @@ use crate::actors::resources::memory::cover_message;
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
+use crate::protocol::op::fields::mistyped;
 use crate::protocol::op::{
     ActionGoal, Arguments, CallService, GoalStatus, Problem, ProviderOp, Served,
 };
@@ -268,7 +269,8 @@ impl Registry {
             });
         };
         if !args.get().starts_with(['{', '[']) {
-            return Err(Refusal::BadArguments);
+            let expected = "an object or an array";
+            return Err(Refusal::BadArguments(mistyped(expected, args.raw())));
         }
         let server = self.clients.get(&provider.connection);
         if server.is_some_and(|server| server.backlog() > MAX_BACKLOG) {
