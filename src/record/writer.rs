@@ -4,8 +4,6 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Write};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
@@ -66,28 +64,9 @@ impl From<McapError> for RecordError {
 
 /// Writes entries into a file.
 pub struct McapWriter<W: Write> {
-    writer: Writer<NoSeek<Counted<W>>>,
+    writer: Writer<NoSeek<W>>,
     channels: HashMap<&'static str, Channel>,
     messages: u64,
-    bytes: Arc<AtomicU64>,
-}
-
-/// A file with the number of its bytes.
-struct Counted<W> {
-    file: W,
-    bytes: Arc<AtomicU64>,
-}
-
-impl<W: Write> Write for Counted<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = self.file.write(bytes)?;
-        self.bytes.fetch_add(written as u64, Ordering::Relaxed);
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
-    }
 }
 
 struct Channel {
@@ -124,12 +103,7 @@ impl<W: Write> McapWriter<W> {
             .chunk_size(Some(CHUNK_BYTES))
             // A chunk is kept in memory until it is whole, so the file is always the beginning of a valid one.
             .disable_seeking(true);
-        let bytes = Arc::default();
-        let counted = Counted {
-            file,
-            bytes: Arc::clone(&bytes),
-        };
-        let mut writer = options.create(NoSeek::new(counted))?;
+        let mut writer = options.create(NoSeek::new(file))?;
         let facts = [
             ("version", VERSION.to_owned()),
             ("links", settings.links.to_string()),
@@ -154,7 +128,6 @@ impl<W: Write> McapWriter<W> {
             writer,
             channels: HashMap::new(),
             messages: 0,
-            bytes,
         })
     }
 
@@ -224,21 +197,15 @@ impl<W: Write> McapWriter<W> {
     /// If the file cannot be written.
     pub fn finish(mut self) -> Result<W, RecordError> {
         self.writer.finish()?;
-        let mut counted = self.writer.into_inner().into_inner();
-        counted.flush()?;
-        Ok(counted.file)
+        let mut file = self.writer.into_inner().into_inner();
+        file.flush()?;
+        Ok(file)
     }
 
     /// Messages written so far.
     #[must_use]
     pub fn messages(&self) -> u64 {
         self.messages
-    }
-
-    /// Length of the file so far, in whole chunks.
-    #[must_use]
-    pub fn bytes(&self) -> u64 {
-        self.bytes.load(Ordering::Relaxed)
     }
 
     fn put(

@@ -40,6 +40,8 @@ pub(super) struct Tape {
     clock: TapeClock,
 }
 
+type RecordWriter = McapWriter<io::BufWriter<Arc<File>>>;
+
 /// An entry in the queue, with its bytes.
 type Waiting = (RecordEntry, OwnedSemaphorePermit);
 
@@ -68,12 +70,14 @@ pub(super) fn begin(
     let spawned = thread::Builder::new()
         .name("recorder".into())
         .spawn(move || {
-            let writer = open(&target).and_then(|file| {
-                McapWriter::new(io::BufWriter::new(file), &settings)
-                    .map_err(|why| failure(&target, &why))
+            let begun = open(&target).and_then(|file| {
+                let file = Arc::new(file);
+                let writer = McapWriter::new(io::BufWriter::new(Arc::clone(&file)), &settings)
+                    .map_err(|why| failure(&target, &why))?;
+                Ok((file, writer))
             });
-            let writer = match writer {
-                Ok(writer) => writer,
+            let (file, writer) = match begun {
+                Ok(begun) => begun,
                 Err(why) => return drop(answer.send(Err(why))),
             };
             let (tape, queue) = Tape::new();
@@ -82,7 +86,7 @@ pub(super) fn begin(
             if answer.send(Ok(Begun { tape, end })).is_err() {
                 return;
             }
-            let recorded = write(writer, &queue, &counts, &target, over);
+            let recorded = write((&file, writer), &queue, &counts, &target, over);
             // The program may end without waiting for the file.
             let _ = ended.send(recorded);
         });
@@ -178,25 +182,22 @@ impl Tape {
 
 /// Writes entries until the last tape is dropped, the file fails, or the size limit is reached.
 fn write(
-    mut writer: McapWriter<io::BufWriter<File>>,
+    (file, mut writer): (&File, RecordWriter),
     queue: &Receiver<Waiting>,
     counts: &TapeCounts,
     target: &TapeTarget,
     over: impl FnOnce(),
 ) -> Recorded {
-    let file = file_name(&target.path);
-    let outcome = take_entries(&mut writer, queue, counts, target);
+    let outcome = take_entries((file, &mut writer), queue, counts, target);
     counts.is_over.store(true, Ordering::Relaxed);
-    let mut recorded = Recorded {
-        messages: writer.messages(),
-        bytes: writer.bytes(),
+    let messages = writer.messages();
+    let finished = outcome.and_then(|is_last| writer.finish().map(|_| is_last));
+    let recorded = Recorded {
+        file: file_name(&target.path),
+        messages,
+        bytes: file.metadata().map_or(0, |file| file.len()),
         dropped: counts.dropped.load(Ordering::Relaxed),
-        file,
     };
-    let finished = outcome.and_then(|is_last| {
-        recorded.bytes = writer.finish()?.get_ref().metadata()?.len();
-        Ok(is_last)
-    });
     match finished {
         Ok(true) => {}
         Ok(false) => {
@@ -217,7 +218,7 @@ fn write(
 
 /// Writes waiting entries. Returns `false` if the file has become too long.
 fn take_entries(
-    writer: &mut McapWriter<io::BufWriter<File>>,
+    (file, writer): (&File, &mut RecordWriter),
     queue: &Receiver<Waiting>,
     counts: &TapeCounts,
     target: &TapeTarget,
@@ -257,7 +258,9 @@ fn take_entries(
         if is_last {
             return Ok(true);
         }
-        if target.limit.is_some_and(|limit| writer.bytes() >= limit) {
+        if let Some(limit) = target.limit
+            && file.metadata()?.len() >= limit
+        {
             return Ok(false);
         }
     }

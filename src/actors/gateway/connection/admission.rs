@@ -15,7 +15,7 @@ use tokio::time::{Instant, timeout_at};
 use super::transport::read_some;
 use crate::actors::gateway::limits::HEAD_TIME;
 use crate::protocol::op::token::Token;
-use crate::protocol::op::{self, Op};
+use crate::protocol::op::{self, Incoming, Op};
 use crate::protocol::wire::frame::FrameReader;
 #[cfg(feature = "web")]
 use crate::web::Site;
@@ -134,28 +134,28 @@ pub(super) enum AuthError {
     Crowded,
 }
 
-/// Returns the op of a client's first frame, if it has the token.
-pub(super) fn authenticate(token: &Token, op: Op) -> Result<Op, AuthError> {
-    match &op {
-        Op::Auth {
+/// Checks whether a client's first frame has the token.
+pub(super) fn authenticate(token: &Token, frame: &Incoming) -> Result<(), AuthError> {
+    match &frame.op {
+        Ok(Op::Auth {
             token: Some(shown), ..
-        } if token.matches(shown) => Ok(op),
-        Op::Auth { token: Some(_), .. } => Err(AuthError::Wrong),
+        }) if token.matches(shown) => Ok(()),
+        Ok(Op::Auth { token: Some(_), .. }) => Err(AuthError::Wrong),
         _ => Err(AuthError::NotShown),
     }
 }
 
 /// Whether a first frame is from a command of this program.
-pub(super) const fn is_command(op: &Op) -> bool {
-    matches!(op, Op::Auth { is_command, .. } if *is_command)
+pub(super) const fn is_command(frame: &Incoming) -> bool {
+    matches!(frame.op, Ok(Op::Auth { is_command, .. }) if is_command)
 }
 
-/// Reads a first frame until `due`. All bytes read stay in `first`.
-pub(super) async fn first_op<S: AsyncRead + Unpin>(
+/// Reads a first frame until `due`. All bytes read stay in `first`. Returns its op and its `id`, or why there is no frame.
+pub(super) async fn first_frame<S: AsyncRead + Unpin>(
     stream: &mut S,
     first: &mut BytesMut,
     due: Instant,
-) -> Result<Op, AuthError> {
+) -> Result<Incoming, AuthError> {
     let mut frames = FrameReader::new();
     let mut seen = 0;
     loop {
@@ -163,7 +163,7 @@ pub(super) async fn first_op<S: AsyncRead + Unpin>(
         seen = first.len();
         if let Some(frame) = frames.next() {
             let frame = frame.map_err(|_| AuthError::NotShown)?;
-            return op::read(&frame.text).op.map_err(|_| AuthError::NotShown);
+            return Ok(op::read(&frame.text));
         }
         if seen > MAX_AUTH_BYTES {
             return Err(AuthError::TooMuch);

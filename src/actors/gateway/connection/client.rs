@@ -151,8 +151,12 @@ impl<S: ClientStream> Connection<S> {
 
     /// Refuses the client: it gets a status with the reason, and its further input is discarded.
     pub(super) fn refuse(&mut self, why: &str) {
+        self.refuse_in(messages::status(Level::Error, why, None));
+    }
+
+    /// The same, for a reason that is already a status.
+    pub(super) fn refuse_in(&mut self, status: Bytes) {
         self.is_refused = true;
-        let status = messages::status(Level::Error, why, None);
         self.push_response(status, &[]);
     }
 

@@ -98,8 +98,8 @@ impl<S: ClientStream> Connection<S> {
         self.transport = Some(opened.transport);
         let reading: Pin<Box<dyn ActorFuture<Self, Output = ()>>> = match opened.place {
             Ok(place) => Box::pin(ClientReader::new(place, opened.first)),
-            Err(why) => {
-                self.refuse(&why);
+            Err(status) => {
+                self.refuse_in(status);
                 self.is_finishing = true;
                 Box::pin(wrap_future(ready(())))
             }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use actix::prelude::*;
-use bytes::BytesMut;
+use bytes::{Bytes, BytesMut};
 #[cfg(feature = "web")]
 use hyper::StatusCode;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
@@ -15,7 +15,7 @@ use tokio::sync::Notify;
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
 use super::admission::{
-    Admission, AuthError, HeldSlot, WRONG_TOKEN_TIME, authenticate, first_op, is_command,
+    Admission, AuthError, HeldSlot, WRONG_TOKEN_TIME, authenticate, first_frame, is_command,
 };
 use super::flow::Ends;
 use super::transport::{ClientStream, Transport};
@@ -30,6 +30,7 @@ use crate::protocol::messages::{self, Level};
 #[cfg(feature = "web")]
 use crate::protocol::wire::frame::Foreign;
 use crate::protocol::wire::frame::{Opening, opening};
+use crate::protocol::wire::json::Payload;
 #[cfg(feature = "web")]
 use crate::web::response::refusal;
 
@@ -45,8 +46,8 @@ pub(super) struct ClientSession {
 
 /// A client that exchanges frames from now on.
 pub(super) struct Opened<S> {
-    /// Its place, or the reason why it gets none.
-    pub(super) place: Result<HeldPlace, String>,
+    /// Its place, or the status with the reason why it gets none.
+    pub(super) place: Result<HeldPlace, Bytes>,
     pub(super) transport: Transport<S>,
     /// Bytes that were already read.
     pub(super) first: BytesMut,
@@ -79,8 +80,8 @@ enum Detected {
     /// It uses HTTP. The head of its first request must be complete by this time.
     #[cfg(feature = "web")]
     Http(Instant),
-    /// It is refused with this reason.
-    Refused(String),
+    /// It is refused with this status.
+    Refused(Bytes),
     /// The runtime ends the connection.
     Gone,
 }
@@ -133,7 +134,7 @@ impl ClientSession {
             (Detected::Http(due), Ok(place)) => {
                 return self.serve_http(stream, first, due, Ok(place)).await;
             }
-            (_, place) => place.map_err(|why| self.turn_away(why)),
+            (_, place) => place.map_err(|why| refused(&self.turn_away(why), None)),
         };
         Some(Opened {
             place,
@@ -151,20 +152,18 @@ impl ClientSession {
         if !matches!(how, Detected::Json) {
             return how;
         }
-        let op = first_op(stream, first, due).await;
-        let op = match &self.admission.token {
-            None => op,
-            Some(token) => match op.and_then(|op| authenticate(token, op)) {
-                Err(why) => {
-                    if why == AuthError::Wrong {
-                        self.delay_wrong_token().await;
-                    }
-                    return Detected::Refused(why.to_string());
+        let frame = first_frame(stream, first, due).await;
+        if let Some(token) = &self.admission.token {
+            let shown = frame.as_ref().map_err(|why| *why);
+            if let Err(why) = shown.and_then(|frame| authenticate(token, frame)) {
+                if why == AuthError::Wrong {
+                    self.delay_wrong_token().await;
                 }
-                op => op,
-            },
-        };
-        if op.is_ok_and(|op| is_command(&op)) {
+                let id = shown.ok().and_then(|frame| frame.id.as_ref());
+                return Detected::Refused(refused(&why.to_string(), id));
+            }
+        }
+        if frame.is_ok_and(|frame| is_command(&frame)) {
             Detected::Command
         } else {
             Detected::Json
@@ -226,7 +225,7 @@ impl ClientSession {
         first: &mut BytesMut,
         due: Option<Instant>,
     ) -> Detected {
-        let foreign = |why: &str| Detected::Refused(why.to_owned());
+        let foreign = |why: &str| Detected::Refused(refused(why, None));
         let mut deadline = due;
         loop {
             match opening(first) {
@@ -283,7 +282,7 @@ impl ClientSession {
             Opening::Foreign(Foreign::Http) => {
                 refusal(StatusCode::SERVICE_UNAVAILABLE, &why).into()
             }
-            _ => messages::status(Level::Error, &why, None),
+            _ => refused(&why, None),
         };
         let tell = async {
             stream.write_all(&message).await?;
@@ -291,4 +290,9 @@ impl ClientSession {
         };
         let _ = timeout(Duration::ZERO, tell).await;
     }
+}
+
+/// The status of a client that is refused. `id` is that of its frame.
+fn refused(why: &str, id: Option<&Payload>) -> Bytes {
+    messages::status(Level::Error, why, id)
 }
