@@ -132,18 +132,13 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
         return Err(PlanError::Unstable);
     }
     let reference = Reference::known_to(task).await?;
-    let mut candidates: Vec<Candidate> = Vec::new();
-    let mut has_run = false;
+    let (mut candidates, mut has_run) = (Vec::<Candidate>::new(), false);
     for (control, most) in loops {
-        pause().await;
-        let method = control.method;
         let least = count::whole((reference.whole / most * (1.0 - count::ROUNDING)).ceil());
         // The number of steps that costs less than the best run so far.
         let cheapest = candidates.iter().map(|one| one.evaluations).min();
-        let affordable = cheapest.map_or(u64::MAX, |least| {
-            least.saturating_sub(1) / u64::from(method.evaluations())
-        });
-        let affordable = affordable.min(MAX_STEPS) / reference.count;
+        let steps = (cheapest.unwrap_or(u64::MAX) - 1) / u64::from(control.method.evaluations());
+        let affordable = steps.min(MAX_STEPS) / reference.count;
         let mut trials = MethodTrials {
             reference: &reference,
             control,
@@ -154,15 +149,13 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
         candidates.extend(trials.best);
     }
     candidates.sort_by_key(|one| std::cmp::Reverse(one.evaluations));
-    let Some(&best) = candidates.last() else {
-        return Err(if has_run {
-            PlanError::NotFound(task.error)
-        } else {
-            PlanError::TooManySteps(longest_stable)
-        });
+    let none = if has_run {
+        PlanError::NotFound(task.error)
+    } else {
+        PlanError::TooManySteps(longest_stable)
     };
     Ok(Planned {
-        best,
+        best: *candidates.last().ok_or(none)?,
         candidates,
         uncertainty: reference.uncertainty,
     })
