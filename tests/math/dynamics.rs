@@ -129,6 +129,22 @@ fn largest(values: &[f64]) -> f64 {
 
 /// Both accelerations belong to the same effort. They may differ as far as M is ill-conditioned. On extreme
 /// arms the book's line loses all digits.
+fn assert_line_and_recursion_agree<const N: usize>(
+    arm: &Arm<N>,
+    [q, qd, tau]: [&[f64; N]; 3],
+    case: &str,
+) {
+    let (m, book) = (mass_matrix(arm, q), textbook(arm, q, qd, tau));
+    let recursion = forward_dynamics(arm, q, qd, tau);
+    let effort = |qdd: &[f64; N]| m.map(|row| row.iter().zip(qdd).map(|(m, a)| m * a).sum());
+    let (one, other): ([f64; N], [f64; N]) = (effort(&book), effort(&recursion));
+    let scale = largest(m.as_flattened()) * largest(&recursion).max(largest(&book));
+    let bound = 316.0 * ROUND_OFF * (N as f64 * scale + largest(tau));
+    for (one, other) in one.iter().zip(other) {
+        assert!((one - other).abs() <= bound, "{case}: {one} and {other}");
+    }
+}
+
 #[test]
 fn the_line_of_the_book_and_the_recursion_agree() {
     fn check<const N: usize>() {
@@ -140,25 +156,39 @@ fn the_line_of_the_book_and_the_recursion_agree() {
                 && largest(&case.q).max(largest(&case.qd)) < 10.0
         });
         assert!(cases.len() > 8, "{} ordinary cases", cases.len());
-        for case in cases {
-            let Case {
-                arm, q, qd, tau, ..
-            } = &case;
-            let (m, book) = (mass_matrix(arm, q), textbook(arm, q, qd, tau));
-            let recursion = case.forward();
-            let effort =
-                |qdd: &[f64; N]| m.map(|row| row.iter().zip(qdd).map(|(m, a)| m * a).sum());
-            let (one, other): ([f64; N], [f64; N]) = (effort(&book), effort(&recursion));
-            let scale = largest(m.as_flattened()) * largest(&recursion).max(largest(&book));
-            let bound = 316.0 * ROUND_OFF * (N as f64 * scale + largest(tau));
-            for (one, other) in one.iter().zip(other) {
-                let told = format!("{}: {one} and {other}", case.stored["id"]);
-                assert!((one - other).abs() <= bound, "{told}");
-            }
+        for Case {
+            arm,
+            q,
+            qd,
+            tau,
+            stored,
+        } in &cases
+        {
+            assert_line_and_recursion_agree(arm, [q, qd, tau], &stored["id"].to_string());
         }
     }
     check::<2>();
     check::<3>();
+}
+
+/// The runtime has arms of 2 and 3 links, and the library any number.
+#[test]
+fn arms_of_other_numbers_of_links_agree_too() {
+    fn check<const N: usize>() {
+        let mut random = fastrand::Rng::with_seed(N as u64);
+        for case in 0..100 {
+            let mut numbers = |middle: f64, most: f64| {
+                [(); N].map(|()| middle + most * (2.0 * random.f64() - 1.0))
+            };
+            let (lengths, masses) = (numbers(1.0, 0.5), numbers(1.0, 0.5));
+            let arm = Arm::new(lengths, masses, 9.81).unwrap();
+            let [q, qd, tau] = [3.0, 2.0, 5.0].map(|most| numbers(0.0, most));
+            assert_line_and_recursion_agree(&arm, [&q, &qd, &tau], &case.to_string());
+        }
+    }
+    check::<1>();
+    check::<4>();
+    check::<6>();
 }
 
 /// The first angle only sets the direction of gravity relative to the arm, so it may be left out.
