@@ -43,3 +43,24 @@ pub(crate) fn log2(x: f64) -> f64 {
 pub(crate) fn exp2(x: f64) -> f64 {
     libm::exp2(x)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_and_logarithms_are_those_of_the_standard_library_to_a_few_units() {
+        for x in [0.3, 1.7, 250.0_f64] {
+            for (got, want) in [
+                (pow(x, 1.5), x.powf(1.5)),
+                (cbrt(x), x.cbrt()),
+                (ln(x), x.ln()),
+                (log2(x), x.log2()),
+                (exp2(x), x.exp2()),
+            ] {
+                let off = (got - want).abs();
+                assert!(off <= 1e-15 * want.abs(), "{x}: {got} and {want}");
+            }
+        }
+    }
+}

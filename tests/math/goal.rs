@@ -1,7 +1,7 @@
 //! A goal's entry and dwell at every physics step, and the cadence of its feedback, in simulation time alone.
 
 use glam::{DVec2, dvec2};
-use pendularm::math::goal::{Cadence, Criteria, Goal};
+use pendularm::math::goal::{Cadence, Criteria, Goal, Outcome};
 use proptest::prelude::*;
 
 const TARGET: DVec2 = dvec2(1.0, 0.5);
@@ -17,6 +17,19 @@ fn goal(epsilon: f64, success_hold: f64, start: f64) -> Goal {
         success_hold,
     };
     Goal::new(TARGET, criteria, start)
+}
+
+#[test]
+fn a_goal_tells_its_age_and_its_end_by_name() {
+    let goal = goal(0.1, 0.5, 3.0);
+    let ages = [5.5, 3.0, 2.0].map(|time| goal.elapsed(time));
+    assert_eq!(
+        ages,
+        [2.5, 0.0, 0.0],
+        "a clock set back makes none negative"
+    );
+    let ends = [Outcome::Reached, Outcome::Preempted].map(|end| end.to_string());
+    assert_eq!(ends, ["reached", "preempted"]);
 }
 
 /// The step (counted from 1) after which a goal is reached, by `success_hold`, timestep and the steps at which the end

@@ -70,3 +70,25 @@ fn any_number_of_steps_agrees_with_50_digits() {
         }
     }
 }
+
+/// On an oscillator half the timestep divides the error by 2 to the power of the order.
+#[test]
+fn a_method_has_the_order_that_it_states() {
+    for (method, name) in [
+        (Method::Euler, "euler"),
+        (Method::Midpoint, "midpoint"),
+        (Method::Verlet, "verlet"),
+        (Method::Rk4, "rk4"),
+    ] {
+        let error = |steps: u32| {
+            let dt = 1.0 / f64::from(steps);
+            let states = states(method, |_, x, _| -x, (1.0, 0.0), dt, steps);
+            let (x, v) = states[steps as usize];
+            (x - 1.0_f64.cos()).abs().max((v + 1.0_f64.sin()).abs())
+        };
+        let order = (error(100) / error(200)).log2();
+        let off = (order - f64::from(method.order())).abs();
+        assert!(off < 0.05, "{method}: order {order}");
+        assert_eq!(method.to_string(), name);
+    }
+}

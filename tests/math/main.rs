@@ -15,6 +15,7 @@
 #[cfg(feature = "batch")]
 mod batch;
 mod control;
+mod count;
 mod default_gains;
 mod divergence;
 mod dynamics;

@@ -44,6 +44,17 @@ fn a_restart_discards_the_unfinished_fraction_and_the_due_steps() {
 }
 
 #[test]
+fn the_arm_is_behind_by_the_time_since_its_last_step_was_due() {
+    let mut pacer = Pacer::new(ns(5 * SECOND), 0.01);
+    let now = ns(5 * SECOND + 209_000_000);
+    assert_eq!(pacer.due(now), 20);
+    for (taken, behind) in [(0, 0.209), (5, 0.159), (15, 0.009)] {
+        pacer.took(taken);
+        assert!((pacer.behind(now) - behind).abs() < 1e-12, "{behind}");
+    }
+}
+
+#[test]
 fn a_clock_that_runs_backwards_makes_no_step_due() {
     let mut pacer = Pacer::new(ns(5 * SECOND), 0.001);
     assert_eq!(pacer.due(ns(4 * SECOND)), 0);

@@ -47,6 +47,9 @@ fn a_path_passes_through_its_points_and_rests_before_and_after_them() {
             assert!(near(at.velocity, velocity, 1e-15), "{at:?}");
         }
     }
+    let halfway = path.at(2.75);
+    let velocity = [1.2, 0.4];
+    assert!(near(halfway.position, [1.5, 2.5], 1e-15) && near(halfway.velocity, velocity, 1e-15));
     let end = path.at(9.0);
     assert_eq!((end.position, end.velocity), ([3.0, 3.0], [0.0, 0.0]));
     // A path that begins with its first point needs no start.

@@ -4,7 +4,7 @@ mod rules;
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
-use pendularm::math::pid::Gains;
+use pendularm::math::pid::{Gains, Pid, Setpoint};
 use pendularm::math::simulation::{ControlPeriod, Simulation};
 
 #[test]
@@ -59,7 +59,9 @@ fn pushed_steps(timestep: f64, duration: f64, before: u64) -> u64 {
     simulation.disturb([1.0, 0.0], duration);
     let mut pushed = 0;
     for _ in 0..200 {
+        let effort = simulation.effort_of_next_step();
         simulation.step();
+        assert_eq!(simulation.effort(), &effort);
         pushed += u64::from(simulation.effort()[0] != 0.0);
     }
     pushed
@@ -94,4 +96,52 @@ fn a_disturbance_shorter_than_the_clock_can_tell_is_in_one_step() {
         simulation.advance(1);
         assert_eq!(simulation.effort(), &effort);
     }
+}
+
+#[test]
+fn another_method_and_another_arm_act_from_the_next_step_on() {
+    let mut simulation = Simulation::<2>::new(Arm::default(), Gains::default());
+    simulation.advance(100);
+    let heavy = Arm::new([1.0, 1.0], [1.0, 3.0], 5.0).unwrap();
+    let mut changed = simulation.clone();
+    changed.set_arm(heavy);
+    assert_eq!(changed.arm(), &heavy);
+    let mut euler = simulation.clone();
+    euler.set_method(Method::Euler);
+    for one in [&mut simulation, &mut changed, &mut euler] {
+        one.step();
+    }
+    let velocity = simulation.state().velocity;
+    assert_ne!(changed.state().velocity, velocity);
+    assert_ne!(euler.state().velocity, velocity);
+}
+
+#[test]
+fn only_a_start_and_a_reset_of_the_controller_empty_its_integral() {
+    let mut law = Pid::<2>::new(Gains::default());
+    let integral = |law: &Pid<2>| *law.integral();
+    let (filled, empty) = ([0.5, -0.25], [0.0; 2]);
+    law.commit(filled);
+    assert_eq!(integral(&law), filled);
+    law.enable(false);
+    assert_eq!(integral(&law), filled);
+    law.enable(true);
+    assert_eq!(integral(&law), empty, "from off to on");
+    law.commit(filled);
+    law.enable(true);
+    assert_eq!(integral(&law), filled, "already on");
+    law.set_setpoint(Setpoint::at([1.0, 2.0]));
+    law.reset();
+    let reset = (integral(&law), law.setpoint().position, law.is_enabled());
+    assert_eq!(reset, (empty, empty, true));
+}
+
+#[test]
+fn increments_are_added_to_a_state() {
+    let state = State {
+        position: [1.0, 2.0],
+        velocity: [3.0, 4.0],
+    };
+    let sum = state.plus(&([0.5, -0.5], [2.0, -3.0]));
+    assert_eq!((sum.position, sum.velocity), ([1.5, 1.5], [5.0, 1.0]));
 }
