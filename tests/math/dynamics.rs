@@ -140,6 +140,7 @@ fn assert_line_and_recursion_agree<const N: usize>(
     let (one, other): ([f64; N], [f64; N]) = (effort(&book), effort(&recursion));
     let scale = largest(m.as_flattened()) * largest(&recursion).max(largest(&book));
     let bound = 316.0 * ROUND_OFF * (N as f64 * scale + largest(tau));
+    assert!(bound.is_finite(), "{case}: {book:?}");
     for (one, other) in one.iter().zip(other) {
         assert!((one - other).abs() <= bound, "{case}: {one} and {other}");
     }
