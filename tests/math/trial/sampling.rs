@@ -47,26 +47,28 @@ proptest! {
 #[test]
 fn targets_are_as_likely_everywhere_in_the_reachable_plane() {
     // Mean of the squared distance: half way between the squares of the edges, if area is what counts. Its standard
-    // error over n draws is (b² - a²) / √(12 n). That of the mean bearing is 2π / √(12 n). A deviation of five standard
-    // errors does not happen by chance, and the seed is fixed.
+    // error over n draws is (b² - a²) / √(12 n). That of the mean bearing, and of the mean orientation, is 2π / √(12 n).
+    // A deviation of five standard errors does not happen by chance, and the seed is fixed.
     const DRAWS: u32 = 40_000;
-    let lengths = [1.0, 0.6];
-    let (least, greatest) = (0.4 + 0.05 * 1.2, 1.6 - 0.05 * 1.2);
+    // With a last link shorter than the margin every orientation is possible.
+    let lengths = [1.0, 0.6, 0.01];
+    let (least, greatest) = (0.39 + 0.05 * 1.22, 1.61 - 0.05 * 1.22);
     let mut rng = fastrand::Rng::with_seed(1);
-    let (mut squares, mut bearings) = (0.0, 0.0);
+    let (mut squares, mut bearings, mut orientations) = (0.0, 0.0, 0.0);
     for _ in 0..DRAWS {
-        let at = sample(&lengths, || rng.f64()).unwrap().position;
-        squares += at.length_squared() / f64::from(DRAWS);
-        bearings += at.y.atan2(at.x) / f64::from(DRAWS);
+        let target = sample(&lengths, || rng.f64()).unwrap();
+        squares += target.position.length_squared() / f64::from(DRAWS);
+        bearings += target.position.to_angle() / f64::from(DRAWS);
+        orientations += target.orientation.unwrap() / f64::from(DRAWS);
     }
     let width = greatest * greatest - least * least;
     let error = (12.0 * f64::from(DRAWS)).sqrt().recip();
     let middle: f64 = 0.5 * (greatest * greatest + least * least);
-    assert!(
-        (squares - middle).abs() < 5.0 * width * error,
-        "{squares} for {middle}"
-    );
-    assert!(bearings.abs() < 5.0 * TAU * error, "{bearings}");
+    let off = (squares - middle).abs();
+    assert!(off < 5.0 * width * error, "{squares} for {middle}");
+    for mean in [bearings, orientations] {
+        assert!(mean.abs() < 5.0 * TAU * error, "{mean}");
+    }
 }
 
 #[test]
