@@ -57,3 +57,17 @@ impl Registers {
 fn lanes_of<S: Simd>(_: S) -> usize {
     Wide::<S, 1>::WIDTH
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_width_is_there_once_and_the_widest_first() {
+        let lanes: Vec<_> = Registers::all().into_iter().map(Registers::lanes).collect();
+        assert_eq!(lanes.first(), Some(&Registers::widest().lanes()));
+        assert!(lanes.is_sorted_by(|one, next| one > next), "{lanes:?}");
+        #[cfg(target_arch = "x86_64")]
+        assert_eq!(lanes.last(), Some(&2));
+    }
+}

@@ -110,3 +110,23 @@ pub(crate) fn add_carried<T: Number, const N: usize>(
     }
     (sums, carries)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::pid::Gains;
+    use crate::math::simulation::Simulation;
+
+    #[test]
+    fn a_step_alone_is_the_first_step_of_a_simulation() {
+        for method in Method::ALL {
+            let mut simulation = Simulation::<3>::new(Arm::default(), Gains::default());
+            simulation.set_method(method);
+            let (start, h) = (*simulation.state(), simulation.timestep());
+            let alone = state_after(simulation.arm(), method, &start, &[0.0; 3], h);
+            simulation.step();
+            assert_eq!(&alone, simulation.state(), "{method}");
+            assert_ne!(alone, start, "{method}");
+        }
+    }
+}
