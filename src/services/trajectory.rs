@@ -183,13 +183,15 @@ fn point<const N: usize>(
 
 /// A duration in seconds: the sum of its parts, each under its name of ROS 2 or of ROS 1.
 fn seconds(raw: &RawValue, field: &str) -> Result<f64, RejectedField> {
-    let part = |name: &str, of_ros_1: &str| {
-        let [value, other] = json::members(raw.get(), &[name, of_ros_1])
+    let [sec, nanosec, secs, nsecs] =
+        json::members(raw.get(), &["sec", "nanosec", "secs", "nsecs"])
             .map_err(|_| mistyped(field, "an object with sec and nanosec", raw))?;
-        let name = if value.is_some() { name } else { of_ros_1 };
-        number_or_zero(value.or(other), &format!("{field}.{name}"))
+    let part = |one: (Option<&RawValue>, &str), of_ros_1: (Option<&RawValue>, &str)| {
+        let (value, name) = if one.0.is_some() { one } else { of_ros_1 };
+        number_or_zero(value, &format!("{field}.{name}"))
     };
-    let sum = part("sec", "secs")? + 1e-9 * part("nanosec", "nsecs")?;
+    let nanoseconds = part((nanosec, "nanosec"), (nsecs, "nsecs"));
+    let sum = part((sec, "sec"), (secs, "secs"))? + 1e-9 * nanoseconds?;
     if !sum.is_finite() {
         let why = "must be a finite number of seconds";
         return Err(RejectedField::refused(field, &why));
