@@ -269,3 +269,59 @@ impl<const N: usize> Course<N> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The greatest number, so that twice of it overflows.
+    const MAX: f64 = f64::MAX;
+
+    /// Whether a path between two points is accepted: their times, positions and velocities.
+    fn is_path(times: [f64; 2], positions: [f64; 2], velocities: Option<[f64; 2]>) -> bool {
+        let point = |at: usize| Waypoint {
+            time: times[at],
+            position: [positions[at]],
+            velocity: velocities.map(|both| [both[at]]),
+        };
+        JointPath::new(point(0), vec![point(0), point(1)]).is_ok()
+    }
+
+    #[test]
+    fn each_term_of_a_path_and_their_sum_must_be_finite() {
+        for (case, times, positions, velocities) in [
+            ("both positions", [0.0, 1.0], [MAX / 25.0; 2], None),
+            (
+                "both velocities",
+                [0.0, 1.0],
+                [0.0; 2],
+                Some([MAX / 20.0; 2]),
+            ),
+            (
+                "the way of a velocity",
+                [0.0, 1e155],
+                [0.0; 2],
+                Some([1e155, 0.0]),
+            ),
+            (
+                "positions and velocities",
+                [0.0, 1.0],
+                [MAX / 30.0, 0.0],
+                Some([MAX / 15.0, 0.0]),
+            ),
+            ("positions and rates", [0.0, 1.0], [MAX / 15.0, 0.0], None),
+            (
+                "a rate, after some time",
+                [1.0, 1.5],
+                [MAX / 20.0, 0.0],
+                None,
+            ),
+            ("a rate", [0.0, 1e-200], [MAX / 3e200, 0.0], None),
+        ] {
+            assert!(!is_path(times, positions, velocities), "{case}");
+            let less = positions.map(|position| position / 1e3);
+            let slower = velocities.map(|both| both.map(|velocity| velocity / 1e3));
+            assert!(is_path(times, less, slower), "less of {case}");
+        }
+    }
+}

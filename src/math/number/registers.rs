@@ -61,6 +61,7 @@ fn lanes_of<S: Simd>(_: S) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::number::Number;
 
     #[test]
     fn each_width_is_there_once_and_the_widest_first() {
@@ -69,5 +70,34 @@ mod tests {
         assert!(lanes.is_sorted_by(|one, next| one > next), "{lanes:?}");
         #[cfg(target_arch = "x86_64")]
         assert_eq!(lanes.last(), Some(&2));
+    }
+
+    /// How `K` registers judge values near a limit of 5, and values that are not finite.
+    fn check_judgement<S: Simd, const K: usize>(simd: S) {
+        let all = |value| Wide::<S, K>::splat(simd, value);
+        assert!(Wide::all_within(&[all(3.0), all(-3.9)], 5.0));
+        assert!(Wide::all_finite(&[all(1e308)], &[all(-1e308)]));
+        for lane in 0..Wide::<S, K>::LANES {
+            for (value, is_finite) in [(-5.1, true), (f64::NAN, false), (f64::INFINITY, false)] {
+                let mut one = all(0.0);
+                one.set_lane(lane, value);
+                for values in [[one, all(0.0)], [all(0.0), one]] {
+                    let [first, second] = values;
+                    let case = format!("{value} in lane {lane}");
+                    assert!(!Wide::all_within(&values, 5.0), "{case}");
+                    assert_eq!(Wide::all_finite(&[first], &[second]), is_finite, "{case}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn far_values_and_those_that_are_not_finite_are_found_in_every_lane() {
+        for registers in Registers::all() {
+            dispatch!(registers.level(), simd => {
+                check_judgement::<_, 1>(simd);
+                check_judgement::<_, 2>(simd);
+            });
+        }
     }
 }

@@ -118,6 +118,15 @@ mod tests {
     use crate::math::simulation::Simulation;
 
     #[test]
+    fn only_an_odd_arm_without_gravity_leaves_out_its_first_angle() {
+        let weightless = Arm::new([1.0; 3], [1.0; 3], 0.0).expect("valid");
+        let even = Arm::new([1.0; 2], [1.0; 2], 0.0).expect("valid");
+        assert!(leaves_out_first_angle(&weightless));
+        assert!(!leaves_out_first_angle(&Arm::<3>::default()));
+        assert!(!leaves_out_first_angle(&even));
+    }
+
+    #[test]
     fn a_step_alone_is_the_first_step_of_a_simulation() {
         for method in Method::ALL {
             let mut simulation = Simulation::<3>::new(Arm::default(), Gains::default());
