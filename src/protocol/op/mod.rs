@@ -754,3 +754,20 @@ impl OpReader<'_> {
         }))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_subscription_with_stamps_of_ros_1_suffices_for_a_client() {
+        let plain = Encoding::default();
+        let old = Encoding {
+            ros1_stamps: true,
+            ..plain
+        };
+        for (one, other, merged) in [(plain, old, old), (old, plain, old), (plain, plain, plain)] {
+            assert_eq!(one.merged(other), merged);
+        }
+    }
+}

@@ -135,7 +135,7 @@ impl Outbox {
         if frame.len() <= SHORT {
             self.short_bytes += frame.len();
         }
-        let number = self.number();
+        let number = next_number(&mut self.produced);
         self.responses.push_back((number, frame));
     }
 
@@ -290,14 +290,9 @@ impl Outbox {
         !self.topics.is_empty()
     }
 
-    const fn number(&mut self) -> u64 {
-        self.produced += 1;
-        self.produced
-    }
-
     fn enqueue(&mut self, topic: Option<&Arc<str>>, since: Instant, frame: Bytes) {
         self.topic_bytes += counted(&frame);
-        let number = self.number();
+        let number = next_number(&mut self.produced);
         let replaced = topic.and_then(|topic| {
             let mut old = self.topics.range(..self.kept_old);
             old.position(|message| message.is_on(topic))
@@ -312,6 +307,12 @@ impl Outbox {
             self.drop_message(replaced);
         }
     }
+}
+
+/// The number of the next message or response in the order of production.
+const fn next_number(produced: &mut u64) -> u64 {
+    *produced += 1;
+    *produced
 }
 
 // ---- throttles ------------------------------------------------------------------------------------------------------
@@ -362,9 +363,8 @@ impl Outbox {
                     self.dropped += 1;
                     continue;
                 }
-                self.produced += 1;
                 let message = QueuedMessage {
-                    number: self.produced,
+                    number: next_number(&mut self.produced),
                     since: now,
                     topic: Some(Arc::clone(topic)),
                     frame: by_itself(frame, is_series),

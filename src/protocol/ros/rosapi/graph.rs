@@ -157,3 +157,32 @@ pub(super) fn are_same_type(own: &str, name: &str) -> bool {
         .map(|rest| format!("rosapi/{rest}"));
     names::same_type(own, name) || older.is_some_and(|older| names::same_type(&older, name))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::ros::rosapi::answer;
+
+    #[test]
+    fn a_list_of_names_that_must_be_escaped_has_at_most_the_expected_bytes() {
+        let empty = Census::default();
+        let listed = Listed {
+            name: "\u{1}".repeat(200).into(),
+            type_name: Some("\u{2}".repeat(100).into()),
+            published: true,
+            subscribed: false,
+        };
+        let full = Census {
+            topics: vec![listed],
+            ..Census::default()
+        };
+        let bytes = |census| {
+            answer(Rosapi::Topics, "", census)
+                .unwrap()
+                .to_string()
+                .len()
+        };
+        let more = bytes(&full) - bytes(&empty);
+        assert!((1800..=full.most_bytes()).contains(&more), "{more}");
+    }
+}
