@@ -26,7 +26,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// computations continue.
 const LET_GO: Duration = Duration::from_secs(60);
 /// Length of a pause before memory is read.
-const QUIET: Duration = Duration::from_secs(13);
+const QUIET: Duration = Duration::from_secs(3);
 /// Descriptors that the program opens for its first subscriber and keeps, to query the unread bytes of clients.
 const OPENED_ONCE: usize = 1;
 /// Bound of the memory at any time, as in `make attack` \[MB\].
