@@ -41,8 +41,8 @@ summary() {
             verdict("call / bare echo, least of rounds (" substr(all, 2) ")", least, "at most 1.5", least <= 1.5)
             past("idle")
             while ((getline line < file) > 0) { split(line, x, " ")
-                if (line ~ /^idle/) verdict("idle, % of one core", x[4], "under 0.5", x[4] < 0.5)
-                if (line ~ /^resident/) verdict("resident, MB", x[2], "under 15", x[2] < 15)
+                if (line ~ /^idle/) verdict("idle, % of one core", x[4], "under 0.3", x[4] < 0.3)
+                if (line ~ /^resident/) verdict("resident, MB", x[2], "under 10", x[2] < 10)
                 if (line ~ /^sim time/) verdict("simulation time / wall time", x[6], "within 0.001 of 1", x[6] > 0.999 && x[6] < 1.001) }
             past("allocations")
             while ((getline line < file) > 0) { split(line, x, " ")

@@ -88,6 +88,8 @@ struct Server {
     protocol: Protocol,
     address: SocketAddr,
     pid: u32,
+    /// Processor time in a second without clients, at the start \[ns\].
+    rest: f64,
 }
 
 /// The work of a server in a scene.
@@ -95,6 +97,8 @@ struct Server {
 pub struct Played {
     /// Round by round.
     pub outcomes: Vec<Outcome>,
+    /// Processor time in a second without clients, round by round \[ns\].
+    pub rests: Vec<f64>,
     /// Times of light requests beside it \[ns\].
     pub calls: Vec<u32>,
     /// Simulation time by wall time beside it, the arm's.
@@ -128,9 +132,10 @@ fn main() {
         protocol: Protocol::Pendularm,
         address: program.address,
         pid: program.pid(),
+        rest: 0.0,
     };
     let peers = words.map(|text| server(text));
-    let servers: Vec<Server> = std::iter::once(ours).chain(peers).collect();
+    let mut servers: Vec<Server> = std::iter::once(ours).chain(peers).collect();
     let plan = if quick {
         Plan {
             rounds: 1,
@@ -146,19 +151,18 @@ fn main() {
             bars: true,
         }
     };
-    let at_rest: Vec<(Protocol, f64)> = servers
-        .iter()
-        .map(|server| (server.protocol, rest(server, plan.seconds)))
-        .collect();
-    report::print_rest(&at_rest);
+    for server in &mut servers {
+        server.rest = rest(server, plan.seconds);
+    }
+    report::print_rest(&servers);
     let mut verdicts = Vec::new();
     for scene in &SCENES {
         let played = play(scene, &servers, &plan);
-        report::print_scene(scene, &played, &at_rest);
+        report::print_scene(scene, &played);
         verdicts.push((*scene, played));
     }
     if plan.bars {
-        report::print_bars(&verdicts, &at_rest);
+        report::print_bars(&verdicts);
     } else {
         println!("\nnothing was lost, nothing came out of order; too short a run for bars");
     }
@@ -185,6 +189,7 @@ fn server(text: &str) -> Server {
             .expect("a server that we know"),
         address: address.parse().expect("an address"),
         pid: pid.parse().expect("a process id"),
+        rest: 0.0,
     }
 }
 
@@ -208,13 +213,18 @@ fn play(scene: &Scene, servers: &[Server], plan: &Plan) -> Vec<(Protocol, Played
         // Another one begins each round.
         for turn in 0..servers.len() {
             let index = (round + turn) % servers.len();
-            let Server {
-                protocol,
-                address,
-                pid,
-            } = *servers[index];
-            let outcome = Fleet::open(protocol, address, *scene).run(pid, plan.seconds);
-            played[index].1.outcomes.push(outcome);
+            let server = servers[index];
+            // It changes in minutes by more than few deliveries take, so then it is measured beside them.
+            let at_rest = if scene.is_light() {
+                rest(server, plan.seconds)
+            } else {
+                server.rest
+            };
+            let outcome =
+                Fleet::open(server.protocol, server.address, *scene).run(server.pid, plan.seconds);
+            let played = &mut played[index].1;
+            played.rests.push(at_rest);
+            played.outcomes.push(outcome);
         }
     }
     if is_probed(scene) {
@@ -230,6 +240,7 @@ fn probe(scene: &Scene, server: &Server, seconds: f64, played: &mut Played) {
         protocol,
         address,
         pid,
+        ..
     } = *server;
     let fleet = Fleet::open(protocol, address, *scene);
     let caller = probe::caller(protocol, address);

@@ -2,9 +2,9 @@
 //!
 //! **Invariant:** medians of the rounds are compared, with the better peer.
 
-use crate::Played;
 use crate::fleet::{Scene, Traffic};
 use crate::message::Template;
+use crate::{Played, Server};
 use pendularm_benches::protocol::Protocol;
 
 /// Largest drift of simulation time by wall time from 1.
@@ -12,23 +12,19 @@ const MOST_DRIFT: f64 = 0.001;
 /// For 99 of 100 calls \[ms\].
 const MOST_DELAY: f64 = 5.0;
 
-/// Servers with their processor time in a second without clients \[ns\].
-pub type Rest = [(Protocol, f64)];
-
-pub fn print_rest(rest: &Rest) {
+pub fn print_rest(servers: &[Server]) {
     println!(
         "a message: {} bytes of JSON, made by the same client for all",
         Template::new().length()
     );
-    let part =
-        |(protocol, used): &(Protocol, f64)| format!("{} {:.2} %", protocol.name(), used / 1e7);
+    let part = |one: &Server| format!("{} {:.2} %", one.protocol.name(), one.rest / 1e7);
     println!(
         "of one core without clients: {}",
-        rest.iter().map(part).collect::<Vec<_>>().join(", ")
+        servers.iter().map(part).collect::<Vec<_>>().join(", ")
     );
 }
 
-pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)], rest: &Rest) {
+pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)]) {
     println!("\n=== {}", scene.name);
     println!(
         "{:<10} {:>12} {:>22} {:>9} {:>9} {:>9} {:>9} {:>8}",
@@ -70,7 +66,7 @@ pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)], rest: &Rest) {
                 least(&costs),
                 most(&costs)
             ),
-            net(*protocol, played, rest),
+            net(played),
             part(0.5),
             part(0.99),
             part(0.999),
@@ -90,7 +86,7 @@ pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)], rest: &Rest) {
     }
 }
 
-pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
+pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)]) {
     println!("\n=== summary");
     // The arm's own topic has no peers. It is compared with the same fan-out between clients.
     let peers_of = |scene: &Scene| {
@@ -123,10 +119,10 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
                 .fold(f64::INFINITY, f64::min);
             let best_net = peers
                 .iter()
-                .map(|(peer, played)| net(*peer, played, rest))
+                .map(|(_, peer)| net(peer))
                 .fold(f64::INFINITY, f64::min);
             let ratio = median(costs(ours)) / best;
-            let net = net(Protocol::Pendularm, ours, rest) / best_net;
+            let net = net(ours) / best_net;
             let what = format!(
                 "{}: CPU per delivery / better peer (less rest {net:.2})",
                 scene.name
@@ -166,10 +162,10 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
 /// Largest processor time for a delivery, as a share of the better peer's, and whether the time at rest is left out of
 /// it. With few subscribers that is most of the figure, and ours simulates an arm meanwhile.
 const fn most_of_peer(scene: &Scene) -> (f64, bool) {
-    match (scene.traffic, scene.subscribers) {
-        (Traffic::Flood, _) => (1.0, false),
-        (_, 0..=10) => (1.5, true),
-        (_, _) => (1.1, false),
+    match scene.traffic {
+        Traffic::Flood => (1.0, false),
+        _ if scene.is_light() => (1.5, true),
+        _ => (1.1, false),
     }
 }
 
@@ -189,19 +185,13 @@ fn costs(played: &Played) -> Vec<f64> {
         .collect()
 }
 
-/// The same as a median, without the server's idle time.
-fn net(protocol: Protocol, played: &Played, rest: &Rest) -> f64 {
-    let rest = rest
-        .iter()
-        .find(|(one, _)| *one == protocol)
-        .map_or(0.0, |(_, rest)| *rest);
-    median(
-        (played.outcomes.iter())
-            .map(|one| {
-                (one.processor as f64 - rest * one.seconds) / one.deliveries.max(1) as f64 / 1e3
-            })
-            .collect(),
-    )
+/// The same as a median, without the server's time at rest.
+fn net(played: &Played) -> f64 {
+    let rounds = played.outcomes.iter().zip(&played.rests);
+    let net = rounds.map(|(one, rest)| {
+        (one.processor as f64 - rest * one.seconds) / one.deliveries.max(1) as f64 / 1e3
+    });
+    median(net.collect())
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -45,6 +45,13 @@ pub struct Scene {
     pub traffic: Traffic,
 }
 
+impl Scene {
+    /// Whether a server at rest takes about as much processor time as its deliveries.
+    pub const fn is_light(&self) -> bool {
+        matches!(self.traffic, Traffic::Rate(_)) && self.subscribers <= 10
+    }
+}
+
 /// The outcome of a scene.
 pub struct Outcome {
     pub seconds: f64,
