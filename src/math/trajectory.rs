@@ -313,7 +313,7 @@ mod tests {
             (
                 "a rate, after some time",
                 [1.0, 1.5],
-                [MAX / 20.0, 0.0],
+                [0.0, MAX / 20.0],
                 None,
             ),
             ("a rate", [0.0, 1e-200], [MAX / 3e200, 0.0], None),

@@ -116,6 +116,11 @@ impl Chain {
         }
     }
 
+    /// The sum of the lengths.
+    const fn stretched(&self) -> f64 {
+        self.l1 + self.l2 + self.l3
+    }
+
     /// The distances from the base that links 1 and 2 allow for the wrist.
     fn wrist_reach(&self) -> Reach {
         Reach::of(&[self.l1, self.l2])
@@ -123,7 +128,7 @@ impl Chain {
 
     /// Whether a `distance` counts as in `reach`.
     fn check_reach(&self, reach: Reach, distance: f64) -> Result<(), Outside> {
-        let slack = BOUNDARY * (self.l1 + self.l2 + self.l3);
+        let slack = BOUNDARY * self.stretched();
         if distance - reach.outer > slack {
             Err(Outside::Beyond)
         } else if reach.inner - distance > slack {
@@ -217,7 +222,7 @@ impl Chain {
         // On the base itself all orientations are admissible or none.
         let reach = self.wrist_reach();
         let wrist = end_effector - self.l3 * present;
-        let rounding = ROUNDING * (self.l1 + self.l2 + self.l3);
+        let rounding = ROUNDING * self.stretched();
         let present_distance = hypot(wrist.x, wrist.y);
         let admissible = reach.inner - rounding..=reach.outer + rounding;
         if admissible.contains(&present_distance) || end_effector == DVec2::ZERO {

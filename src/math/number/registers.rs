@@ -99,5 +99,6 @@ mod tests {
                 check_judgement::<_, 2>(simd);
             });
         }
+        assert!(f64::all_within(&[3.0, -3.9], 5.0));
     }
 }

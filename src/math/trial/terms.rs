@@ -2,8 +2,6 @@
 //!
 //! **Invariant:** these are plain values. All rules are in [`Trial`](super::Trial).
 
-use std::fmt;
-
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::Target;
 
@@ -107,12 +105,6 @@ impl ActionStatus {
             Self::Reached => "reached",
             Self::Preempted => "preempted",
         }
-    }
-}
-
-impl fmt::Display for ActionStatus {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
     }
 }
 
