@@ -7,8 +7,10 @@ prefix=$2
 mkdir -p "$prefix/bin"
 # On Windows a program has an extension.
 case $program in *.exe) file=pendularm.exe ;; *) file=pendularm ;; esac
-cp "$program" "$prefix/bin/$file"
-chmod 755 "$prefix/bin/$file"
+# A running program cannot be written, but its name can get another file.
+cp "$program" "$prefix/bin/$file.new"
+chmod 755 "$prefix/bin/$file.new"
+mv -f "$prefix/bin/$file.new" "$prefix/bin/$file"
 "$program" completions --help >/dev/null 2>&1 || exit 0
 
 completions() { # shell, folder, file

@@ -24,7 +24,7 @@
 //! ```
 //! use pendularm::math::{arm::Arm, integrator::Method, pid::{Gains, Setpoint}, simulation::Simulation};
 //!
-//! let arm = Arm::new([1.0, 1.0], [1.0, 1.0], 9.81)?; // masses, lengths, gravity
+//! let arm = Arm::new([1.0, 1.0], [1.0, 1.0], 9.81)?; // lengths, masses, gravity
 //! let mut simulation = Simulation::new(arm, Gains { kp: [1000.0, 250.0], ki: [3000.0, 750.0], kd: [110.0, 22.0] });
 //! simulation.set_method(Method::Rk4);
 //! simulation.set_timestep(0.001);

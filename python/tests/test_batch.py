@@ -140,6 +140,19 @@ def test_an_arm_that_diverges_leaves_the_others_alone():
     assert batch.time.tolist() == [2.0, 0.0, 2.0]
 
 
+@pytest.mark.parametrize("steps_before", [0, 5])
+def test_an_effort_ends_with_its_call_also_for_an_arm_that_diverges(steps_before):
+    batch = pendularm.Batch(2, threads=1)
+    batch.set_state([0.0, 0.0], [1e200, 1e200], arms=[1])
+    batch.step(steps_before)
+    batch.step(100, [3.0, 1.0])
+    assert batch.diverged.tolist() == [False, True]
+    batch.set_state([0.3, -0.5])
+    batch.step()
+    assert batch.effort.tolist() == [[0.0, 0.0]] * 2
+    assert batch.position[1].tolist() == batch.position[0].tolist()
+
+
 def test_arrays_come_out_without_copies_and_cannot_be_written(links):
     batch = pendularm.Batch(8, links)
     position, time = batch.position, batch.time

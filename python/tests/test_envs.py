@@ -242,6 +242,19 @@ def test_actions_have_a_row_for_each_arm(actions):
         one.step(actions)
 
 
+@pytest.mark.parametrize("given", [[[1, 1], [1, 2, 3]], range(2**62)])
+def test_what_is_no_array_is_refused_by_its_name(given):
+    env, one = pendularm.envs.PendularmVectorEnv(3), pendularm.envs.PendularmEnv()
+    env.reset(seed=0)
+    one.reset(seed=0)
+    with pytest.raises(ValueError, match="^actions must be an array, got "):
+        env.step(given)
+    with pytest.raises(ValueError, match="^action must be an array, got "):
+        one.step(given)
+    with pytest.raises(ValueError, match="^reset_mask must be an array, got "):
+        env.reset(options={"reset_mask": given})
+
+
 def test_masked_actions_are_refused():
     env, one = pendularm.envs.PendularmVectorEnv(3), pendularm.envs.PendularmEnv()
     env.reset(seed=0)

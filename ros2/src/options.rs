@@ -5,6 +5,7 @@
 use std::path::PathBuf;
 
 use clap::{Arg, Command, value_parser};
+use pendularm::address;
 
 /// The options, with their defaults.
 #[derive(Debug, Clone)]
@@ -65,9 +66,10 @@ fn command() -> Command {
         .arg(
             Arg::new("connect")
                 .long("connect")
-                .value_name("HOST:PORT")
+                .value_name("ADDRESS")
                 .default_value("127.0.0.1:9095")
-                .help("Address of the arm"),
+                .value_parser(read_address)
+                .help("Address of the arm: a port, a host, both, or a URL"),
         )
         .arg(
             Arg::new("router")
@@ -103,6 +105,11 @@ fn command() -> Command {
                 .value_parser(value_parser!(PathBuf))
                 .help("Only write the source of the ROS 2 package pendularm_interfaces into FOLDER"),
         )
+}
+
+/// Host and port.
+fn read_address(text: &str) -> Result<String, &'static str> {
+    address::read(text).ok_or("it must be a port, a host, both or a URL without TLS")
 }
 
 /// A valid ROS 2 namespace with a leading slash.
@@ -141,6 +148,26 @@ mod tests {
         assert_eq!(read_namespace("/"), Ok(String::new()));
         for wrong in ["/left/", "//left", "/2nd", "/le ft", "/a*", "/%", "/a$"] {
             assert!(read_namespace(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn an_address_is_a_port_a_host_or_both() {
+        let address = |text: &str| {
+            let matches = command()
+                .try_get_matches_from(["", "--connect", text])
+                .ok()?;
+            matches.get_one::<String>("connect").cloned()
+        };
+        for (text, found) in [
+            ("9096", "127.0.0.1:9096"),
+            ("localhost", "localhost:9095"),
+            ("ws://10.0.0.1:80/", "10.0.0.1:80"),
+        ] {
+            assert_eq!(address(text).as_deref(), Some(found));
+        }
+        for wrong in ["", "host:port", "host:99999", "wss://host"] {
+            assert_eq!(address(wrong), None, "{wrong}");
         }
     }
 

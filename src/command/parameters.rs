@@ -113,6 +113,25 @@ struct DiagnosedPart {
     level: u8,
     name: String,
     message: String,
+    values: Vec<DiagnosedValue>,
+}
+
+/// A value of a part.
+#[derive(Deserialize)]
+struct DiagnosedValue {
+    key: String,
+    value: String,
+}
+
+impl DiagnosedPart {
+    /// Why it is not OK. The message of a part with a warning is that of a part without one.
+    fn reason(&self) -> &str {
+        let warning = self.values.iter().find(|one| one.key == "warning");
+        match warning {
+            Some(warning) if self.level == 1 => &warning.value,
+            _ => &self.message,
+        }
+    }
 }
 
 pub(super) async fn diagnostics(session: &mut Session) -> Outcome {
@@ -123,8 +142,10 @@ pub(super) async fn diagnostics(session: &mut Session) -> Outcome {
     session.show(&message, "")?;
     match status.into_iter().find(|part| part.level != 0) {
         None => Ok(()),
-        Some(DiagnosedPart { name, message, .. }) => {
-            Err(CommandError::Refused(format!("{name}: {message}")))
-        }
+        Some(part) => Err(CommandError::Refused(format!(
+            "{}: {}",
+            part.name,
+            part.reason()
+        ))),
     }
 }

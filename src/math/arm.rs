@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use super::shown::Shown;
 
-/// Parameters of an arm with `N` links, and the constants that the dynamics derive from them.
+/// Parameters of an arm with `N` links, at least one, and the constants that the dynamics derive from them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arm<const N: usize> {
     lengths: [f64; N],
@@ -96,6 +96,7 @@ impl<const N: usize> Arm<N> {
     }
 
     fn valid(lengths: [f64; N], masses: [f64; N], gravity: f64) -> Self {
+        const { assert!(N > 0, "an arm has at least one link") };
         let mut rods = lengths.map(|length| Rod {
             length,
             beyond: 0.0,

@@ -20,7 +20,7 @@ use super::goal::{Dwell, SUCCESS_HOLD};
 use super::pid::Setpoint;
 use super::shown::shown_against;
 
-/// A point of a path.
+/// A point of a path. Its numbers must be finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Waypoint<const N: usize> {
     /// Time of the point from the start \[s\].

@@ -48,7 +48,7 @@ pub enum ReadError {
     #[error(transparent)]
     File(io::Error),
     /// It is not an MCAP file, or is damaged.
-    #[error("not a record: {}", shortened(&.0.to_string(), 200))]
+    #[error("not a record, or damaged: {}", shortened(&.0.to_string(), 200))]
     Mcap(McapError),
     /// A message that does not match its definition.
     #[error("{}: {why}", excerpt(topic))]

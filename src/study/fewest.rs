@@ -54,7 +54,7 @@ pub async fn fewest(first: u64, most: u64, part: u64, mut trial: impl StepTrial)
     let mut end = most.saturating_add(1);
     loop {
         if let Some(mut enough) = best {
-            while enough - too_few > (enough / part).max(1) {
+            while enough - too_few > (enough / part.max(1)).max(1) {
                 let middle = too_few + (enough - too_few) / 2;
                 if trial.is_enough(middle).await {
                     enough = middle;
@@ -66,7 +66,7 @@ pub async fn fewest(first: u64, most: u64, part: u64, mut trial: impl StepTrial)
         }
         let from = (end / 2).max(first).max(ALL + 1);
         let stride = (end.saturating_sub(from) / NEIGHBOURS).max(1);
-        let mut next = from + stride;
+        let mut next = from.saturating_add(stride);
         loop {
             if next >= end {
                 return best;
@@ -74,7 +74,7 @@ pub async fn fewest(first: u64, most: u64, part: u64, mut trial: impl StepTrial)
             if trial.is_enough(next).await {
                 break;
             }
-            next += stride;
+            next = next.saturating_add(stride);
         }
         (too_few, best) = (next - stride, Some(next));
     }

@@ -65,9 +65,9 @@ const DEFAULT_SETTLING: f64 = 3.0;
 /// The demands on gains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GainsRequirements {
-    /// Time in which every move must settle \[s\].
+    /// Time in which every move must settle \[s\], greater than 0.
     pub settling_time: f64,
-    /// Required ratio of the smallest timestep limit over all poses to the timestep.
+    /// Required ratio of the smallest timestep limit over all poses to the timestep, at least 1.
     pub margin: f64,
 }
 

@@ -53,9 +53,9 @@ pub struct Task<const N: usize> {
     pub control: ControlLoop<N>,
     /// The arm's state at the start.
     pub start: State<N>,
-    /// Duration of the motion \[s\].
+    /// Duration of the motion \[s\], greater than 0.
     pub duration: f64,
-    /// Largest allowed error of the end effector's position \[m\].
+    /// Largest allowed error of the end effector's position \[m\], greater than 0.
     pub error: f64,
 }
 

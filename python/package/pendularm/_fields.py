@@ -9,7 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Floats", "flag", "is_masked", "number", "numbers", "path", "read_seeds", "shown", "whole_number"]
+__all__ = [
+    "Floats",
+    "as_array",
+    "flag",
+    "is_masked",
+    "number",
+    "numbers",
+    "path",
+    "read_seeds",
+    "shown",
+    "whole_number",
+]
 
 Floats = NDArray[np.float64]
 
@@ -18,10 +29,10 @@ MOST_LISTED = 10_000_000
 
 
 def shown(value: Any) -> str:
-    """A value as shown in an error. Python does not print integers with thousands of digits."""
+    """A value as shown in an error. Python does not print integers with thousands of digits, and some objects raise."""
     try:
         return f"{value!r:.60}"
-    except ValueError:
+    except Exception:
         return f"an object of {type(value)}"
 
 
@@ -82,6 +93,16 @@ def is_too_long(value: Any, depth: int = 2) -> bool:
     except OverflowError:
         return True
     return depth > 0 and isinstance(value, list | tuple) and any(is_too_long(one, depth - 1) for one in value)
+
+
+def as_array(name: str, value: Any) -> NDArray[Any]:
+    """The value as an array of any type."""
+    try:
+        if not is_too_long(value):
+            return np.asarray(value)
+    except ValueError:
+        pass
+    raise ValueError(f"{name} must be an array, got {shown(value)}")
 
 
 def number(name: str, value: Any) -> float:

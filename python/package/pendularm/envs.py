@@ -20,7 +20,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ._fields import is_masked, read_seeds, shown, whole_number
+from ._fields import as_array, is_masked, read_seeds, shown, whole_number
 from ._render import METADATA, Frame, Renderer
 from ._tasks import TIMESTEP, Action, Floats, Observation, Reach, SwingUp, Task
 
@@ -36,7 +36,7 @@ def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
     """Checks the shape of actions. The caller clips their values."""
     if is_masked(actions):
         raise ValueError(f"{name} must have no masked numbers, got {shown(actions)}")
-    array = np.asarray(actions)
+    array = as_array(name, actions)
     if array.shape != space.shape or array.dtype.kind not in "biuf":
         raise ValueError(f"{name} must have the shape {space.shape}, of numbers, got {array.shape} of {array.dtype}")
     return array
@@ -160,7 +160,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             given = options["reset_mask"]
             if is_masked(given):
                 raise ValueError(f"reset_mask must have no masked entries, got {shown(given)}")
-            mask = np.asarray(given)
+            mask = as_array("reset_mask", given)
             if mask.dtype != np.bool_ or mask.shape != (self.num_envs,) or not mask.any():
                 raise ValueError(f"reset_mask must be ({self.num_envs},) of bool, one of them true, got {mask!r}")
             if not self._has_begun and not mask.all():

@@ -144,6 +144,10 @@ impl Piece<'_> {
             let left = self.steps.of(first + index).saturating_sub(self.done);
             (lane, left.min(self.length))
         }));
+        if self.effort.is_some() {
+            let diverged = lanes.iter_mut().filter(|lane| lane.divergence().is_some());
+            diverged.for_each(end_disturbance);
+        }
         shown.show(lanes);
     }
 }
@@ -152,10 +156,14 @@ impl Piece<'_> {
 pub(crate) fn end_effort<const N: usize>(lanes: &mut [Simulation<N>], steps: Steps<'_>) {
     for (index, lane) in lanes.iter_mut().enumerate() {
         if steps.of(index) > 0 {
-            // Adding negative zero changes no number.
-            lane.disturb([-0.0; N], lane.timestep());
+            end_disturbance(lane);
         }
     }
+}
+
+/// Replaces the lane's disturbance. Adding negative zero changes no number.
+fn end_disturbance<const N: usize>(lane: &mut Simulation<N>) {
+    lane.disturb([-0.0; N], lane.timestep());
 }
 
 /// Kinetic plus potential energy of every lane \[J\].

@@ -43,7 +43,8 @@ const ANGLE_ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// orientation keep the present orientation if it is admissible. Otherwise they take the nearest admissible one, and of
 /// two equally near ones the counter-clockwise one. If the wrist is on the base, the first joint does not change.
 ///
-/// `lengths` must be finite and greater than 0. A `present` that is not finite counts as 0.
+/// `lengths` must be finite and greater than 0; a debug build panics for others. A `present` that is not finite counts
+/// as 0.
 ///
 /// # Errors
 ///

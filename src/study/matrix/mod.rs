@@ -1,6 +1,6 @@
 //! Small dense matrices for the step matrices of the stability predictions, of sizes up to some ten.
 //!
-//! **Invariant:** no input causes a panic or an endless loop. A value that cannot be computed is NaN, which every
+//! **Invariant:** no entry causes a panic or an endless loop. A value that cannot be computed is NaN, which every
 //! comparison treats as unstable.
 
 mod eigenvalues;

@@ -155,22 +155,22 @@ fn completions_know_every_command_and_a_shell_can_read_them() {
 fn an_installation_has_program_and_completions() {
     let prefix = Folder::new("install");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/install.sh");
-    let mut install = Command::new("bash");
-    install
-        .arg(script)
-        .arg(env!("CARGO_BIN_EXE_pendularm"))
-        .arg(&*prefix);
-    assert!(install.status().unwrap().success());
+    let program = Path::new(env!("CARGO_BIN_EXE_pendularm"));
+    let arguments = [script.as_path(), program, &*prefix];
+    let install = || Command::new("bash").args(arguments).status();
+    assert!(install().unwrap().success());
+    // It replaces a program that runs.
+    let installed = common::without_variables(Command::new(prefix.join("bin/pendularm")));
+    let _running = Runtime::spawn(installed, "127.0.0.1:0", &[]);
+    assert!(install().unwrap().success());
     for file in [
         "bin/pendularm",
         "share/bash-completion/completions/pendularm",
         "share/fish/vendor_completions.d/pendularm.fish",
         "share/zsh/site-functions/_pendularm",
     ] {
-        assert!(
-            fs::metadata(prefix.join(file)).unwrap().len() > 100,
-            "{file}"
-        );
+        let length = fs::metadata(prefix.join(file)).unwrap().len();
+        assert!(length > 100, "{file}");
     }
 }
 
