@@ -13,6 +13,8 @@ class Reconnecting(PageTest):
         self.runtime.stop()
         self.page.until("document.querySelector('#connection-text').textContent !== 'connected'")
         self.page.until("document.querySelector('#notice').textContent.startsWith('Connection lost')")
+        self.assertTrue(self.page.run("document.querySelector('#course-start').disabled"))
+        self.assertIn("The connection is lost", self.page.text("#course-status"))
         self.runtime.start()
         self.connected()
         self.page.until("document.querySelector('#gravity-field input[type=number]').value === '9.81'", why="the new runtime's gravity")

@@ -82,6 +82,9 @@ class BlowUp(PageTest):
         picture = self.image("#push-bars")
         self.assertGreater(picture.count(self.color("bad")), 200)
         self.assertGreater(picture.count(self.color("accent")), 200)
+        self.runtime.call("/pid_controller/set_period", period=0.006)
+        self.page.fill(f"#timestep-field {NUMBER}", "0.5")
+        self.page.until("document.querySelector('#push-text').textContent.includes('a control period of 6 ms: the push does not die away')")
 
     def test_error_against_run_time_is_measured_live(self):
         self.tab("error")

@@ -29,7 +29,7 @@ class Ways(PageTest):
         self.page.click("#pause")
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
         self.page.fill(f"#timestep-field {NUMBER}", "-1")
-        self.page.until("document.querySelector('#timestep-field .refusal').textContent.includes('got -0.001')")
+        self.page.until("document.querySelector('#timestep-field .refusal').textContent === 'timestep must be greater than 0'")
         self.assertTrue(self.page.run("document.querySelector('#undo').disabled"))
         self.page.fill(f"#timestep-field {NUMBER}", "2")
         self.page.until("!document.querySelector('#undo').disabled")
