@@ -65,8 +65,8 @@ class Controls(PageTest):
         said = self.runtime.call("/ik_action/send_goal", x=9, y=0)["status"]
         self.assertEqual(refusal.split(" ")[0], said.split(" ")[0])
         self.page.until("document.querySelector('#announce-assertive').textContent !== ''")
-        self.runtime.call("/ik_action/send_goal", x=0.7, y=1.2)
-        self.page.until("document.querySelector('#goal-body .refusal').textContent === ''", why="another goal was accepted")
+        # The last place of the drag may be refused after the first of these goals.
+        self.wait(lambda: self.runtime.call("/ik_action/send_goal", x=0.7, y=1.2) and self.page.text("#goal-body .refusal") == "", "another goal was accepted")
 
     def test_arrow_keys_in_the_view_move_the_target(self):
         self.page.click("#controller")
