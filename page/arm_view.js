@@ -17,6 +17,7 @@ const NO_DASH = [];
 const BOTH_WAYS = [-1, 1];
 const ROOM = 1.14; // of the reach, as space for circles and labels
 const EFFORT_RADIUS = 19; // px
+const MOST_DIGITS = 4; // after the point, in the labels of the grid
 
 const x = new Float64Array(MOST_LINKS + 1);
 const y = new Float64Array(MOST_LINKS + 1);
@@ -289,7 +290,7 @@ function drawGrid(context) {
         line(context, vertical ? at : 0, vertical ? 0 : at, vertical ? at : width, vertical ? height : at, i === 0 ? colors.line : colors.grid);
         continue;
       }
-      const label = fixed(i * metres, digits);
+      const label = digits > MOST_DIGITS ? significant(i * metres, 3) : fixed(i * metres, digits);
       const edge = at < (vertical ? 24 : CLOCK) || at > size - 24;
       if (i % every !== 0 || edge) continue;
       context.textAlign = vertical ? "center" : "left";

@@ -54,12 +54,12 @@ export const STEPS = [
   },
   {
     id: "slow", title: "Slow the controller down",
-    text: "Now the controller measures less often. The time between two measurements is its period. Guess first: when does the arm begin to shake?",
+    text: "Now you make the controller measure less often. The time between two measurements is its period. Guess first: when does the arm begin to shake?",
     scene: (links) => controlled(links, 0.001),
     chart: "velocity", dial: "period",
     guess: {
       text: "At which period does it begin to shake?", answers: ["about 1 ms", "about 4 ms", "about 50 ms"], right: 1,
-      because: "The red mark shows the limit. For two links it is 4.3 ms.",
+      because: "The red mark shows the limit. It is 4.3 ms for two links and 3 ms for three.",
     },
     task: { text: "Make the period longer until the arm shakes.", done: ({ shook }) => shook },
     question: {

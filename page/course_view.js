@@ -90,11 +90,22 @@ export function startCourse() {
     type: "button", class: "small", "aria-label": `Step ${i + 1}: ${one.title}`, title: one.title, onclick: () => go(i),
   }, String(i + 1))));
   at = Math.max(0, stepIn(location.hash));
-  addEventListener("hashchange", () => { if (stepIn(location.hash) >= 0) { at = stepIn(location.hash); rest(); } });
-  watch("links", () => (isAlone && state.view === "course" && ONLY_STEP.test(location.hash) ? begin() : rest()));
-  watch("connection", (connection) => { if (connection !== "open") rest(); });
+  watch("links", open);
+  watch("connection", rest);
   watchAll(look);
   rest();
+}
+
+/** Opens the step that a new address names. */
+export function followLink() {
+  if (stepIn(location.hash) < 0) return;
+  at = stepIn(location.hash);
+  open();
+}
+
+function open() {
+  if (isAlone && state.links > 0 && state.view === "course" && ONLY_STEP.test(location.hash)) begin();
+  else rest();
 }
 
 /** The present step in the form of a link; empty in the workbench. */
@@ -181,13 +192,15 @@ function show() {
   setText(byId("course-number"), `Step ${at + 1} of ${STEPS.length}`);
   setText(byId("course-title"), one.title);
   setText(byId("course-text"), one.text);
-  setText(byId("course-status"), now.began || state.links === 0 ? "" : "Press “Start” to set the arm. Other viewers see the change.");
+  const lost = state.connection !== "open";
+  setText(byId("course-status"), state.links === 0 || now.began ? "" : lost ? "The connection is lost. The page reconnects by itself." : "Press “Start” to set the arm. Other viewers see the change.");
   setText(byId("course-start"), now.began ? "Restart step" : "Start");
-  byId("course-start").disabled = state.links === 0;
+  byId("course-start").disabled = state.links === 0 || lost;
   byId("course-back").disabled = at === 0;
   byId("course-next").disabled = at === STEPS.length - 1;
   [...byId("course-steps").children].forEach((button, i) => { if (i === at) button.setAttribute("aria-current", "step"); else button.removeAttribute("aria-current"); });
   byId("course-chart").hidden = !CHARTS[one.chart].draw;
+  markOutdated(false);
   byId("course-extra").replaceChildren();
   if (state.links > 0) fillExtra(one);
   makeDial(one);
@@ -367,13 +380,20 @@ function refresh({ chart }) {
   const key = JSON.stringify([loopQuestion(state), state.integrator, period()]);
   if (key === now.asked || !CHARTS[chart].ask) return;
   now.asked = key;
-  inquire({ ask: CHARTS[chart].ask, mine: now });
+  markOutdated(true);
+  inquire({ ask: CHARTS[chart].ask, mine: now, key });
 }
 
-const inquire = latestOnly(async ({ ask, mine }) => {
+/** A chart of earlier settings is faint until the study has answered. */
+function markOutdated(/** @type {boolean} */ outdated) {
+  byId("course-chart").classList.toggle("outdated", outdated);
+}
+
+const inquire = latestOnly(async ({ ask, mine, key }) => {
   if (mine !== now) return;
   const { params, gains, integrator: { method, timestep } } = state;
   await ask({ params, gains, integrator: method, timestep, control_period: state.period?.period ?? 0 });
+  if (mine === now && key === now.asked) markOutdated(false);
   surface.redraw();
   look();
 }, 60);
@@ -384,15 +404,17 @@ async function askBars(common) {
   // Without gravity, so only the push is visible. It is a push of the velocity, which excites the fastest motion of the
   // loop.
   const bars = await deviation({ ...common, params: { ...state.params, gravity: 0 }, setpoint: rest }, rest, period());
-  if (!bars) return;
-  mine.bars = bars;
+  mine.bars = bars ?? [];
   mine.seen.shrinks = shrinks(bars);
 }
 
 async function askErrors(common) {
   const mine = now;
   const { result, values } = await rollout({ ...common, q0: new Array(state.links).fill(0), setpoint: MOVE_TO[state.links], duration: 2, samples: 101, reference: true });
-  if (!result) return;
+  if (!result) {
+    mine.errors = null;
+    return;
+  }
   mine.errors = { error: values.error, sampling: values.sampling_error };
   if (Number.isNaN(mine.firstError) && values.error > 0) mine.firstError = values.error;
   mine.seen.gain = mine.firstError / (values.error ?? NaN);

@@ -59,6 +59,12 @@ export function panel(place, options, buttons, ...last) {
   return { ...said, buttons: made };
 }
 
+/** The answer without the refused figure, which is in seconds and therefore not the typed one. @param {Promise<any>} call */
+async function withoutFigure(call) {
+  const answer = await call;
+  return { ...answer, status: answer.status.replace(/, got [^,]*$/, "") };
+}
+
 /**
  * @param {object} options
  * @param {string} options.label what it is, for everybody
@@ -105,7 +111,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
   };
   const submit = async (value) => {
     pending += 1;
-    await said.report(commit(value));
+    await said.report(unit === "ms" ? withoutFigure(commit(value)) : commit(value));
     pending -= 1;
     show();
   };

@@ -42,6 +42,14 @@ export function duration(seconds) {
   return `${significant(seconds * 1e9, 3)} ns`;
 }
 
+/** @type {Record<string, string>} */
+const SINGULAR = { masses: "mass", lengths: "length" };
+
+/** A refusal with the page's names: "mass 1 must be a number", not "params.masses[0] must be a number, got null". @param {string} status */
+export function inPageNames(status) {
+  return status.replace(/\b(?:gains|params)\./g, "").replace(/\b(\w+)\[(\d)\]/g, (_, name, i) => `${SINGULAR[name] ?? name} ${Number(i) + 1}`).replace(/, got null$/, "");
+}
+
 /** A number for an input field: four digits, with an integer exponent. @param {number} value */
 export function plain(value) {
   return Number.isFinite(value) ? String(Number(value.toPrecision(4))) : "";

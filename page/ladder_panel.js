@@ -72,14 +72,14 @@ function describe(about) {
   setText(byId("ladder-text"), text);
   if (found.length === 0) return;
   announce(text);
-  fillTable(byId("ladder-table"), ["timestep", ...METHODS.map(([, name], i) => [name, `method${i + 1}`])],
+  fillTable(byId("ladder-table"), ["timestep", ...METHODS.map(([method], i) => [shortName(method), `method${i + 1}`])],
     TIMESTEPS.map((timestep) => [duration(timestep), ...METHODS.map(([method]) => cellOf(method, timestep))]));
 }
 
 /** @param {Rung[]} best the cheapest sufficient run of each method */
 function inWords(best) {
   const controlled = found.some(({ sampling }) => sampling !== null);
-  const meaning = controlled ? " Solid lines: error of the method. Dashed lines: error of the controller’s hold, which no method reduces." : "";
+  const meaning = controlled ? " Solid lines: error of the method. Dashed lines: error of the controller’s hold, which no method reduces. The table shows both errors [rad]: method + hold." : " The table shows the errors [rad].";
   if (best.length === 0) return `No run came within ${WANTED} rad of the exact motion.${meaning}`;
   const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
   const uncertainty = uncertaintyOf(found);
@@ -89,7 +89,7 @@ function inWords(best) {
 
 function cellOf(method, timestep) {
   const one = found.find((rung) => rung.method === method && rung.timestep === timestep);
-  return one ? errorText(one) : "–";
+  return one ? errorText(one).replace(" + ", "\u00a0+\u00a0") : "–"; // only other texts may break
 }
 
 const ROOM = { left: 62, right: 14, top: 30, bottom: 36, font: TEXT };

@@ -59,10 +59,10 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   const answer = answerInForce(state, method);
   const free = state.enabled === false || (state.gains != null && isFree(state.gains));
   const { links } = state;
-  if (!answer) return { limit: NaN, where: "", everyPose: NaN, advised: NaN };
+  if (!answer) return { limit: NaN, where: "", place: "", everyPose: NaN, everyPoseAtRest: NaN, advised: NaN };
   const diverged = state.diagnostics?.state === "diverged";
   const held = free && doublingTime(method, state.integrator.timestep, answer) > SLOW_GROWTH ? Infinity : heldLimit(state, answer);
-  const fast = diverged || state.integrator?.timestep > held;
+  const fast = diverged || state.integrator?.timestep > held || periodIsTooLong(state, answer);
   const before = state.limits.motions[method];
   // An arm that has diverged or shakes is fast because of that, so its earlier motion counts.
   const motion = fast ? before?.limit ?? Infinity : open(answer.timestep_limit_motion);
@@ -71,16 +71,20 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   const named = pose ? `(${Array.from(pose, (q) => fixed(q, 2)).join(", ")}) rad` : "";
   const places = {
     setpoint: `at the setpoint ${named}`, sagging: `at the pose to which it sags, ${named}`, saddle: `at the pose to which it falls, ${named}`,
-    hanging: state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns", unstable: `at ${named}, where the gains themselves are at fault`,
+    hanging: state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns",
+    unstable: free ? `at ${named}` : `at ${named}, where the gains themselves are at fault`,
   };
   const place = places[/** @type {keyof typeof places} */ (answer.equilibrium_kind ?? (free ? "hanging" : "setpoint"))];
   const moving = motion < held;
   const inForce = Math.min(held, motion);
+  const everyPoseAtRest = free ? held : Math.min(held, open(answer.minimum_over_poses_held));
   const usual = free ? SHARE * inForce : Math.min(afterReset(answer), SHARE * motion);
   return {
     limit: inForce,
     where: moving ? `moving at ${significant(speed ?? NaN, 3)} rad/s` : place,
-    everyPose: free ? inForce : Math.min(inForce, open(answer.minimum_over_poses_held)),
+    place,
+    everyPose: Math.min(motion, everyPoseAtRest),
+    everyPoseAtRest,
     // Never the timestep at which the arm has just diverged.
     advised: diverged ? Math.min(usual, AFTER_DIVERGENCE * state.integrator.timestep) : usual,
   };
@@ -98,7 +102,7 @@ export function keepAnswer(/** @type {any} */ state, /** @type {string} */ asked
   const { answers, motions } = state.limits;
   answers[method] = answer;
   // A diverging simulation is fast because of that, even at the first answer, so the motion's earlier limit is kept.
-  const isAway = state.diagnostics?.state === "diverged" || (state.enabled && state.integrator.timestep > open(answer?.timestep_limit_held));
+  const isAway = state.diagnostics?.state === "diverged" || (state.enabled && state.integrator.timestep > open(answer?.timestep_limit_held)) || (answer && periodIsTooLong(state, answer));
   if (answer && !isAway) motions[method] ??= { limit: open(answer.timestep_limit_motion), speed: answer.motion_speed };
 }
 
@@ -113,15 +117,30 @@ export function doublingTime(/** @type {string} */ method, /** @type {number} */
   return (Math.LN2 * timestep) / Math.log1p(method === "euler" ? z * z : z ** 4 / 4);
 }
 
-/**
- * The largest stable control period [s]: 0 none, Infinity any, NaN unknown, as while no controller acts. An answer
- * without one belongs to a control law that runs at every step without a delay. Then it is the timestep's limit.
- */
+/** The largest stable control period [s]: 0 none, Infinity any, NaN unknown, as while no controller acts. */
 export function controlPeriodLimit(/** @type {any} */ state) {
   const answer = answerInForce(state);
-  if (!answer || !state.enabled || isFree(state.gains)) return NaN;
+  return answer && acts(state) ? periodLimitIn(state, answer) : NaN;
+}
+
+/**
+ * The same in an answer. An answer without one belongs to a control law that runs at every step without a delay. Then
+ * it is the timestep's limit.
+ */
+function periodLimitIn(/** @type {any} */ { period }, /** @type {any} */ answer) {
   if (answer.control_period_limit !== undefined) return open(answer.control_period_limit);
-  return state.period?.delay ? NaN : open(answer.timestep_limit_held);
+  return period?.delay ? NaN : open(answer.timestep_limit_held);
+}
+
+/** Whether a controller moves the arm. */
+function acts(/** @type {any} */ { enabled, gains }) {
+  return enabled === true && gains != null && !isFree(gains);
+}
+
+/** Whether the control law runs too rarely, so that the arm shakes at every timestep. */
+function periodIsTooLong(/** @type {any} */ state, /** @type {any} */ answer) {
+  const steps = stepsPerUpdate(state);
+  return acts(state) && (steps > 1 || state.period?.delay) && steps * state.integrator.timestep > periodLimitIn(state, answer);
 }
 
 /** Timesteps per control update, as in the runtime: at least 1. */
@@ -140,27 +159,31 @@ export function periodText(/** @type {any} */ state) {
 
 /** @returns {Verdict} */
 export function verdict(/** @type {any} */ state) {
-  const { limit: timestepLimit, where, everyPose, advised } = limitInForce(state);
+  const own = limitInForce(state);
   const { timestep = NaN } = state.integrator ?? {};
-  const steps = state.enabled && state.integrator ? stepsPerUpdate(state) : 1;
-  const slow = steps > 1;
-  const longest = steps * timestep;
-  const limit = slow || (state.enabled && state.period?.delay) ? Math.min(timestepLimit, controlPeriodLimit(state)) : timestepLimit;
+  const steps = acts(state) && state.integrator ? stepsPerUpdate(state) : 1;
+  const periodLimit = steps > 1 || (acts(state) && state.period?.delay) ? controlPeriodLimit(state) : Infinity;
+  // Each clock has its own limit. The sentence is about the control period, unless only the timestep is too long.
+  const slow = steps > 1 && (steps * timestep > periodLimit || !(timestep > own.limit));
+  const time = slow ? steps * timestep : timestep;
+  const where = slow ? own.place : own.where;
+  const limit = Number.isNaN(own.limit) ? NaN : slow ? periodLimit : steps > 1 ? own.limit : Math.min(own.limit, periodLimit);
+  const everyPose = slow ? Math.min(periodLimit, own.everyPoseAtRest) : own.everyPose;
   // A smaller timestep does not make the control period shorter.
-  const offered = !slow && advised > 0 && advised < timestep ? advised : NaN;
+  const offered = !slow && own.advised > 0 && own.advised < timestep ? own.advised : NaN;
   const known = { limit, where, advised: offered, slow };
-  const at = slow ? `A control period of ${duration(longest)}` : duration(timestep);
-  const above = excess(at, longest, limit, where);
+  const at = slow ? `A control period of ${duration(time)}` : duration(time);
+  const above = excess(at, time, limit, where);
   if (state.connection !== "open") return { kind: "offline", pill: "no connection", sentence: "", ...known };
   if (state.diagnostics?.state === "diverged") {
     const sentence = above || (limit > 0 ? `${at} was too long for this motion.` : "");
     return { kind: "diverged", pill: "diverged", sentence, ...known };
   }
   if (Number.isNaN(limit) || Number.isNaN(timestep)) return { kind: "unknown", pill: "limit unknown", sentence: "", ...known };
-  if (longest > limit) {
+  if (time > limit) {
     return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? "beyond the limit" : "never stable", sentence: above, ...known };
   }
-  if (longest > everyPose) {
+  if (time > everyPose) {
     const others = everyPose > 0 ? `other poses are stable only up to ${duration(everyPose)}: on the way there the arm may shake` : "in other poses no timestep is stable, because of the gains";
     const sentence = `${at} is stable ${where}, but ${others}.`;
     return { kind: "here", pill: "stable here only", sentence, ...known };

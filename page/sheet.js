@@ -2,9 +2,9 @@
 // Invariant: the sheet asks the study about the form's arm. The live arm does not change.
 
 import { byId, el } from "./dom.js";
-import { option, panel } from "./field.js";
+import { busy, option, panel } from "./field.js";
 import { METHODS, significant } from "./format.js";
-import { cause, limitText, others } from "./policy.js";
+import { cause, isFree, limitText, others } from "./policy.js";
 import { MOVE_TO } from "./ladder.js";
 import { rollout, stability } from "./runtime.js";
 import { DEFAULTS, toFragment } from "./settings.js";
@@ -13,6 +13,8 @@ import { state } from "./store.js";
 /** The move with the error on the sheet: its duration [s], and its timestep and control period [s]. */
 const MOVE = 2;
 const AT = 0.001;
+/** Times at which the error is measured; the largest counts. */
+const SAMPLES = 101;
 
 /** @type {[string, string][]} */
 const LISTS = [["masses", "mass [kg]"], ["lengths", "length [m]"], ["kp", "kp [N m/rad]"], ["ki", "ki [N m/(rad s)]"], ["kd", "kd [N m s/rad]"]];
@@ -28,14 +30,14 @@ export function showForm(place, whenMade) {
   gravity = option({ label: "gravity", unit: "m/s²", value: known.gravity });
   fields = Object.fromEntries(LISTS.map(([key, name]) => [key, known[key].map((/** @type {number} */ value, /** @type {number} */ i) => option({ label: `${name} ${i + 1}`, value }))]));
   const form = el("div", { id: "own-form" });
-  const go = async () => { if (await make()) whenMade(); };
+  const go = () => busy(said.buttons[0], "Computing…", async () => { if (await make()) whenMade(); });
   said = panel(form, [...Object.values(fields).flat(), gravity], [["Make my sheet", go, { type: "submit", class: "primary" }]]);
   place.replaceChildren(form, el("div", { id: "sheet", role: "region", "aria-label": "The sheet of your arm", hidden: true }));
 }
 
 async function make() {
   const list = (/** @type {string} */ key) => fields[key].map((one) => one.number() ?? NaN);
-  const params = { gravity: gravity.number() ?? 0, masses: list("masses"), lengths: list("lengths") };
+  const params = { gravity: gravity.number() ?? NaN, masses: list("masses"), lengths: list("lengths") };
   const gains = { kp: list("kp"), ki: list("ki"), kd: list("kd") };
   const setpoint = new Array(state.links).fill(0);
   /** @type {Record<string, any>} */
@@ -43,11 +45,11 @@ async function make() {
   for (const [method] of METHODS) {
     const answer = await stability({ params, gains, setpoint, integrator: method, control_period: 0 });
     if (!answer.result) {
-      said.show(plain(answer.status));
+      said.show(answer.status);
       byId("sheet").hidden = true;
       return false;
     }
-    const move = await rollout({ params, gains, q0: setpoint, setpoint: MOVE_TO[state.links], duration: MOVE, timestep: AT, integrator: method, samples: 2, reference: true });
+    const move = await rollout({ params, gains, q0: setpoint, setpoint: MOVE_TO[state.links], duration: MOVE, timestep: AT, control_period: 0, integrator: method, samples: SAMPLES, reference: true });
     answers[method] = { ...answer.values, error: move.result ? move.values.error : null };
   }
   said.show("");
@@ -65,18 +67,20 @@ function sheet(params, gains, answers, link) {
   const text = (/** @type {number[]} */ values) => values.map((one) => significant(one, 4)).join(", ");
   const row = (/** @type {string} */ name, /** @type {string} */ value) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, value));
   const period = answers.rk4.control_period_limit ?? Infinity;
+  const free = isFree(gains);
+  const reason = free ? "all gains are 0, so no controller holds this arm." : period === Infinity ? "nothing limits this arm." : cause(answers.rk4, period);
   return [
     el("h3", {}, "My arm and its two clocks"),
     el("table", {}, el("tbody", {},
       row("Masses", `${text(params.masses)} kg`), row("Lengths", `${text(params.lengths)} m`), row("Gravity", `${significant(params.gravity, 4)} m/s²`),
-      row("Gains kp", text(gains.kp)), row("Gains ki", text(gains.ki)), row("Gains kd", text(gains.kd)),
-      row("Longest control period, stretched out", period === 0 ? "none" : limitText(period)),
+      row("Gains kp", `${text(gains.kp)} N m/rad`), row("Gains ki", `${text(gains.ki)} N m/(rad s)`), row("Gains kd", `${text(gains.kd)} N m s/rad`),
+      row("Longest control period, stretched out", free ? "no controller" : period === 0 ? "none" : limitText(period)),
       ...METHODS.map(([method, name]) => row(`Longest timestep, the controller at each step, ${name}`, limitText(least(answers[method])))),
       row("Longest timestep in every pose, Runge–Kutta 4", limitText(answers.rk4.minimum_over_poses_held ?? Infinity)),
-      ...METHODS.map(([method, name]) => row(`Error of a move of ${MOVE} s at ${1e3 * AT} ms, ${name}`, answers[method].error === null ? "too small to measure, or diverged" : `${significant(answers[method].error, 2)} rad`)),
+      ...METHODS.map(([method, name]) => row(`Largest error of the method in a move of ${MOVE} s at ${1e3 * AT} ms, ${name}`, answers[method].error === null ? "too small to measure, or diverged" : `${significant(answers[method].error, 2)} rad`)),
     )),
-    el("p", {}, `Reason: ${period === Infinity ? "nothing limits this arm." : cause(answers.rk4, period)}`),
-    ...(period === 0 ? [] : [el("p", {}, others(Object.fromEntries(METHODS.map(([method]) => [method, least(answers[method])]))))]),
+    el("p", {}, `Reason: ${reason}`),
+    ...(free || period === 0 ? [] : [el("p", {}, others(Object.fromEntries(METHODS.map(([method]) => [method, least(answers[method])]))))]),
     el("p", { class: "sheet-link" }, "This arm as a link: ", el("a", { href: link }, link)),
     el("div", { class: "buttons no-print" }, el("button", { type: "button", onclick: () => print() }, "Print")),
   ];
@@ -85,9 +89,4 @@ function sheet(params, gains, answers, link) {
 /** The smaller limit of pose and motion [s]. @param {any} answer */
 function least(answer) {
   return Math.min(answer.timestep_limit_held ?? Infinity, answer.timestep_limit_motion ?? Infinity);
-}
-
-/** A refusal with the form's names: "kd of joint 1 must be a number". @param {string} status */
-function plain(status) {
-  return status.replace(/\b(?:gains|params)\.(\w+)(?:\[(\d)\])?/g, (_, name, i) => i === undefined ? name : `${name.replace(/s$/, "")} ${Number(i) + 1}`).replace(/, got null$/, "");
 }

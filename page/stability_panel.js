@@ -10,7 +10,7 @@ import { shrinks } from "./course.js";
 import { byId, el, setText } from "./dom.js";
 import { duration, methodName, METHODS } from "./format.js";
 import { latestOnly } from "./latest.js";
-import { answerInForce, factorOf, limitInForce, limitText, question, scaled, whyText } from "./policy.js";
+import { answerInForce, factorOf, limitInForce, limitText, question, scaled, stepsPerUpdate, whyText } from "./policy.js";
 import { setGains, setIntegrator } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { LOOP, state, watch } from "./store.js";
@@ -41,7 +41,7 @@ export function startStability() {
   watch(["integrator", "gains", "params", "setpoint", "limits", "enabled", "tab", "links"], () => map.redraw());
   canvas.addEventListener("click", (event) => goTo(event.offsetX, event.offsetY));
   canvas.addEventListener("keydown", byArrows);
-  bars = new Surface(byId("push-bars"), () => drawBars(bars, heights, "step"));
+  bars = new Surface(byId("push-bars"), () => drawBars(bars, heights, state.enabled ? "measurement of the controller" : "step"));
   watch([...LOOP, "tab", "view"], lookAtPush);
 }
 
@@ -74,7 +74,7 @@ async function askBorder() {
 function drawStability() {
   askBorder();
   const { context, width, height } = map;
-  chart = new Chart(context, width, height, timesteps, factors, { right: 10, top: 8, bottom: 32 });
+  chart = new Chart(context, width, height, timesteps, factors, { right: 10, top: 8, bottom: 36 });
   chart.frame({ across: "timestep", grid: false });
   const factor = factorOf(state.gains, anchor);
   if (state.integrator && state.gains) drawMap(chart, rows, state.integrator.timestep, factor > 0 ? factor : 1);
@@ -86,7 +86,7 @@ function describeMap() {
   if (!row || !state.integrator) return;
   setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
   setText(byId("map-text"), `Solid line: limit of ${methodName(state.integrator.method)}, ${limitText(row.limit)} with these gains. Dashed line: limit of a controller without a hold, ${limitText(row.continuous)}. `
-    + `Higher gains need a smaller timestep; gains that are too low cannot hold the arm. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to change both.`);
+    + `Higher gains need a smaller timestep; gains that are too low cannot hold the arm. The map is for a controller that acts at every step. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to change both.`);
 }
 
 function goTo(left, top) {
@@ -134,10 +134,11 @@ function lookAtPush() {
 const push = latestOnly(async ({ loop, key }) => {
   const { method: integrator, timestep } = state.integrator;
   const rest = answerInForce(state)?.equilibrium ?? loop.setpoint ?? new Array(state.links).fill(0);
-  const found = await deviation({ setpoint: rest, ...loop, integrator, timestep }, rest, timestep);
+  const steps = state.enabled ? stepsPerUpdate(state) : 1;
+  const found = await deviation({ setpoint: rest, ...loop, integrator, timestep }, rest, steps * timestep);
   if (key !== pushAsked || !found) return;
   heights = found;
-  setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${duration(timestep)}: the push ${shrinks(heights) ? "dies away" : "does not die away"} within ${LOOKS} steps.`);
+  setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${steps > 1 ? "a control period of " : ""}${duration(steps * timestep)}: the push ${shrinks(heights) ? "dies away" : "does not die away"} within ${LOOKS} ${steps > 1 ? "measurements" : "steps"}.`);
   bars.redraw();
 }, ASK_MS);
 

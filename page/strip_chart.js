@@ -58,7 +58,7 @@ export class StripChart {
     this.axis.fit(level < min ? level : min, level > max ? level : max);
     const leftAt = this.leftAt(lines, first, last);
     const named = lines.filter(({ name }) => name);
-    const chart = new Chart(context, width, height, times(this.from, now), this.axis, { ...(named.length > 0 && { top: 18 }), ...(across && { bottom: 30 }) });
+    const chart = new Chart(context, width, height, times(this.from, now), this.axis, { ...(named.length > 0 && { top: 18 }), ...(across && { bottom: 36 }) });
     this.chart = chart;
     chart.frame({ across });
     const { data } = record;
@@ -112,7 +112,7 @@ export class PhasePlot {
     const joints = Array.from({ length: links }, (_, joint) => joint).filter((joint) => shown[joint]);
     this.across.fit(...extent(joints.map((joint) => POSITION + joint), first, last));
     this.axis.fit(...extent(joints.map((joint) => VELOCITY + joint), first, last));
-    const chart = new Chart(context, width, height, this.across, this.axis, { right: 10, top: 8, bottom: 30 });
+    const chart = new Chart(context, width, height, this.across, this.axis, { right: 10, top: 8, bottom: 36 });
     chart.frame({ across: "position [rad]" });
     const at = Number.isFinite(cursor) ? Math.min(firstAfter(cursor), record.length - 1) : last - 1;
     if (last - 1 > first) chart.inside(() => { for (const joint of joints) drawPath(chart, joint, first, last - 1, record.at(at)); });

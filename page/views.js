@@ -5,7 +5,7 @@
 
 import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
-import { chooseLinks, stepInLink } from "./course_view.js";
+import { chooseLinks, followLink, stepInLink } from "./course_view.js";
 import { announce, byId, el, setAddress, setText } from "./dom.js";
 import { isAlone } from "./kernel.js";
 import { fromFragment, presentSettings, toFragment } from "./settings.js";
@@ -27,7 +27,21 @@ export function startViews() {
     setText(byId("view-switch"), view === "course" ? "Workbench" : "Course");
     byId("course").hidden = view !== "course";
   });
-  set("view", stepIn(location.hash) < 0 && SETTINGS.test(location.hash) ? "workbench" : "course");
+  set("view", viewInLink() || "course");
+  // Another link in the address bar of this page, or a click on the sheet's link.
+  addEventListener("hashchange", () => {
+    const view = viewInLink();
+    if (!view) return; // as after the link to the arm
+    set("view", view);
+    followLink();
+    if (state.params) offer();
+  });
+}
+
+/** The view that the address names; empty if it names none. @returns {"course" | "workbench" | ""} */
+function viewInLink() {
+  if (stepIn(location.hash) >= 0) return "course";
+  return SETTINGS.test(location.hash) ? "workbench" : "";
 }
 
 /** In the page in one file the number of links can be chosen. Another number needs another arm, so the page is reloaded. */
@@ -73,7 +87,7 @@ const SHOWN_MS = 2500;
 
 export function startShare() {
   byId("share").addEventListener("click", share);
-  if (location.hash.length > 1) watch("params", offer);
+  if (location.hash.length > 1) watch("params", () => { if (!wasOffered) offer(); });
 }
 
 /** The page's address with the present settings after the #. */
@@ -102,11 +116,11 @@ async function share() {
 let wasOffered = false;
 
 function offer() {
-  if (wasOffered) return;
   wasOffered = true;
   const settings = fromFragment(location.hash);
-  if (!Object.values(settings).some((one) => one !== null)) return;
   const banner = byId("offer");
+  banner.hidden = !Object.values(settings).some((one) => one !== null);
+  if (banner.hidden) return;
   const given = new URLSearchParams(location.hash.slice(1));
   const text = [...given].filter(([name]) => name !== "links" && name !== "step").map(([name, value]) => `${name} ${value}`).join(" · ").slice(0, 300);
   const done = () => { banner.hidden = true; };
@@ -121,6 +135,5 @@ function offer() {
     } }, "Apply"),
     el("button", { type: "button", onclick: done }, "Ignore"), refused,
   );
-  banner.hidden = false;
   announce("This link has settings. Apply or ignore them.");
 }

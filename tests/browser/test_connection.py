@@ -6,53 +6,36 @@ from stage import PageTest, needs_server
 
 @needs_server("no server, no connection that others could have or lose")
 class Reconnecting(PageTest):
-    def test_it_reconnects_after_a_restart_of_the_runtime(self):
+    def test_a_lost_connection_is_reported_everywhere_and_comes_back(self):
         self.runtime.call("/arm_sim/set_params", gravity=4)
         self.page.until("document.querySelector('#gravity-field input[type=number]').value === '4'")
+        self.page.until("!document.querySelector('#verdict-pill').hidden")
+        self.tab("compare")
         self.page.expect_network_errors = True  # the browser itself reports refused connections
         self.runtime.stop()
-        self.page.until("document.querySelector('#connection-text').textContent !== 'connected'")
         self.page.until("document.querySelector('#notice').textContent.startsWith('Connection lost')")
+        self.assertTrue(self.page.run("document.querySelector('#course-start').disabled"))
+        self.assertIn("The connection is lost", self.page.text("#course-status"))
+        # The timestep has no verdict, and what is typed or pressed is refused.
+        self.page.until("document.querySelector('#run-state').textContent === 'no connection'")
+        self.assertEqual(self.page.run("[document.querySelector('#verdict-pill').hidden, document.querySelector('#verdict').textContent]"), [True, ""])
+        self.page.until("document.querySelector('#out-rtf').textContent.startsWith('–')")
+        for field, typed in (("#setpoint-fields", "1"), ("#timestep-field", "2")):
+            self.page.fill(f"{field} input[type=number]", typed)
+        self.page.click("#compare-form button[type=submit]")
+        refused = "[...document.querySelectorAll('#setpoint-fields .refusal, #timestep-field .refusal, #compare-form .refusal')].map((one) => one.textContent).filter(Boolean)"
+        self.page.until(f"{refused}.length === 3 && {refused}.every((one) => one.includes('not connected'))")
+        # It retries meanwhile and fails, so the messages stay.
+        self.page.run("own('store.js').then(({ watch }) => { window.tries = 0; watch('connection', () => { window.tries += 1; }); })")
+        self.page.until("window.tries >= 2", why="two more changes")
+        self.assertEqual(self.page.run(f"{refused}.length"), 3)
         self.runtime.start()
         self.connected()
+        self.page.until(f"{refused}.length === 0")
         self.page.until("document.querySelector('#gravity-field input[type=number]').value === '9.81'", why="the new runtime's gravity")
         self.page.until("document.querySelector('#notice').hidden")
         self.page.click("#controller")
         self.wait(lambda: self.runtime.call("/pid_controller/enable")["values"]["data"], "the controller")
-
-    def test_a_refusal_without_a_connection_ends_with_the_reconnection(self):
-        self.tab("compare")
-        self.page.expect_network_errors = True
-        self.runtime.stop()
-        self.page.until("document.querySelector('#connection-text').textContent !== 'connected'")
-        self.page.click("#compare-form button[type=submit]")
-        self.page.until("document.querySelector('#compare-form .refusal').textContent.includes('not connected')")
-        # It retries meanwhile and fails, so the message stays.
-        tries = "own('store.js').then(({ watch }) => { window.tries = 0; watch('connection', () => { window.tries += 1; }); })"
-        self.page.run(tries)
-        self.page.until("window.tries >= 2", why="two more changes")
-        self.assertIn("not connected", self.page.text("#compare-form .refusal"))
-        self.runtime.start()
-        self.connected()
-        self.page.until("document.querySelector('#compare-form .refusal').textContent === ''")
-
-    def test_without_a_connection_the_timestep_has_no_verdict_and_a_lost_setpoint_is_reported(self):
-        setpoint = "#setpoint-fields input[type=number]"
-        self.page.until("!document.querySelector('#verdict-pill').hidden")
-        self.page.expect_network_errors = True
-        self.runtime.stop()
-        self.page.until("document.querySelector('#run-state').textContent === 'no connection'")
-        self.assertTrue(self.page.run("document.querySelector('#verdict-pill').hidden"))
-        self.assertEqual(self.page.text("#verdict"), "")
-        self.page.until("document.querySelector('#out-rtf').textContent.startsWith('–')")
-        for field, typed in ((setpoint, "1"), ("#timestep-field input[type=number]", "2")):
-            self.page.fill(field, typed)
-        refused = "[...document.querySelectorAll('#setpoint-fields .refusal, #timestep-field .refusal')].map((one) => one.textContent).filter(Boolean)"
-        self.page.until(f"{refused}.length === 2")
-        self.assertEqual(self.page.run(refused), ["not connected"] * 2)
-        self.runtime.start()
-        self.connected()
-        self.page.until(f"{refused}.length === 0")
 
 
 @needs_server("no server, no connection that others could have or lose")

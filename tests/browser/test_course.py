@@ -91,8 +91,11 @@ class Tasks(CourseTest):
         self.step(5)
         self.page.until("document.querySelector('#course-figure').textContent === '4 of 4.3 ms'")
         time.sleep(0.5)  # the first errors are asked for
+        self.page.run("""new MutationObserver(() => { window.faint ||= document.querySelector('.outdated') !== null; })
+            .observe(document.querySelector('#course-chart'), { attributes: true })""")
         self.page.fill(DIAL, "0.2")
         self.done("a hundred times smaller")
+        self.assertTrue(self.page.run("window.faint && document.querySelector('.outdated') === null"), "old errors are faint")
         self.assertEqual(self.page.text("#course-caption"), "Two errors of one move: Midpoint, control period 4 ms")
         self.runtime.call("/arm_sim/set_integrator", method="verlet")
         self.page.until("document.querySelector('#course-caption').textContent.includes('Verlet')")
@@ -125,7 +128,9 @@ class Tasks(CourseTest):
         self.page.click("#scene-S08")
         self.wait(lambda: self.values("/pid_controller/set_gains")["kp"] == [1e6, 1e6], "stiff gains")
         self.page.click("#scene-S35")
-        self.page.until("document.querySelector('#course-status').textContent.includes('masses[0]')", why="refused, with the reason")
+        self.page.until("document.querySelector('#course-status').textContent.includes('mass 1 must be greater than 0')", why="refused, with the reason")
+        self.page.click("#scene-S33")  # its grid has steps of 1e-161 m
+        self.page.until("document.querySelector('#run-state').textContent === 'diverged'")
         self.page.click("#scene-S27")
         self.done("three scenes")
         self.wait(lambda: self.values("/arm_sim/set_params")["gravity"] == 981, "strong gravity")
@@ -151,9 +156,23 @@ class Tasks(CourseTest):
         self.done("a sheet")
         limit = 1e3 * self.values("/study/stability", gains={**gains, "kd": [110, 44]}, setpoint=[0, 0], control_period=0)["control_period_limit"]
         self.assertIn(f"stretched out{float(format(limit, '.3g')):g} ms", self.page.text("#sheet"))
-        self.assertIn("Reason:", self.page.text("#sheet"))
+        move = {"q0": [0, 0], "setpoint": [0.9, -1.3], "duration": 2, "timestep": 0.001, "samples": 101, "reference": True}
+        error = self.values("/study/rollout", gains={**gains, "kd": [110, 44]}, control_period=0, integrator="euler", **move)["error"]
+        self.assertIn(f"at 1 ms, Euler{error:.2g} rad", self.page.text("#sheet"))
         self.assertIn("kd=110,44", self.page.text("#sheet a"))
         self.assertEqual(self.values("/pid_controller/set_gains"), gains)
+        self.page.run("document.querySelectorAll('#own-form .option:nth-child(n + 5):nth-child(-n + 10) input').forEach((one) => { one.value = 0; })")
+        press = "document.querySelector('#own-form button').click(), "  # does nothing while a sheet is computed
+        self.page.until(press + "document.querySelector('#sheet').textContent.includes('Reason: all gains are 0')")
+        self.page.fill("#own-form .option:nth-child(1) input", "")
+        self.page.until(press + "document.querySelector('#own-form .refusal').textContent === 'mass 1 must be a number'")
+
+    def test_a_link_that_is_followed_in_the_open_page_is_offered_in_its_view(self):
+        self.page.run("location.hash = '#links=2&gravity=4'")
+        self.page.until("document.querySelector('#offer').checkVisibility() && document.querySelector('#controls').checkVisibility()")
+        self.page.run("location.hash = '#step=6'")
+        self.page.until("document.querySelector('#course-title').checkVisibility() && !document.querySelector('#offer').checkVisibility()")
+        self.assertEqual(self.page.text("#course-number"), "Step 6 of 10")
 
     def test_both_views_show_the_same_arm_and_a_link_names_the_step(self):
         self.step(6)

@@ -87,10 +87,8 @@ class TwoLinks(View, Sums, PageTest):
         self.page.until("document.querySelector('#announce-polite').textContent === 'Target reached.'")
         self.assertTrue(self.runtime.call("/pid_controller/enable")["values"]["data"])
 
-    def test_the_real_time_factor_is_that_of_the_runtime(self):
+    def test_the_real_time_factor_is_shown_and_the_arm_is_described_in_a_sentence(self):
         self.page.until("Math.abs(parseFloat(document.querySelector('#out-rtf').textContent) - 1) < 0.1")
-
-    def test_the_arm_is_described_in_a_sentence(self):
         self.settle([0.5, 0.5])
         self.page.until("document.querySelector('#arm-text').textContent.includes('paused, controller on. Joints at 29, 29 degrees')")
 

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { answerInForce, controlPeriodLimit, doublingTime, energyName, factorOf, isFree, keepAnswer, limitInForce, motionHasChanged, noGains, periodText, question, scaled, verdict, whyText } from "../../page/policy.js";
+import { answerInForce, controlPeriodLimit, doublingTime, energyName, factorOf, keepAnswer, limitInForce, motionHasChanged, noGains, periodText, question, scaled, verdict, whyText } from "../../page/policy.js";
 
 const VALUES = {
   timestep_limit_held: 0.0136, timestep_limit_continuous: 0.0204, minimum_over_poses_held: 0.00432,
@@ -47,6 +47,7 @@ const VERDICTS = [
   ["a pose that the arm sags to", served({ equilibrium: [0.5, -1.4], equilibrium_kind: "sagging" }), { where: /^at the pose to which it sags, \(0\.50, −1\.40\) rad$/ }],
   ["Euler's free swing", { enabled: false, ...served({ timestep_limit_held: 0, advised_timestep: 0, minimum_over_poses_held: 0 }) }, { kind: "never", advised: NaN }],
   ["nothing that limits", { enabled: false, stability: Object.fromEntries(Object.keys(VALUES).map((key) => [key, null])) }, { kind: "stable", limit: Infinity }],
+  ["numbers that overflow without a controller", { enabled: false, ...served({ timestep_limit_held: 0, equilibrium: [-1.57, 0], equilibrium_kind: "unstable" }) }, { sentence: "No timestep is stable, at (−1.57, 0.00) rad." }],
   ["an arm that has diverged", { diagnostics: { state: "diverged" } }, { kind: "diverged" }],
 ];
 for (const [name, changed, wanted] of VERDICTS) {
@@ -83,6 +84,21 @@ test("a control period that is too long is unstable, however short the timestep"
   assert.equal(here.kind, "here");
   assert.match(here.sentence, /^A control period of 6 ms is stable at the setpoint/);
   assert.equal(verdict(sampled(0.004)).kind, "stable");
+});
+
+const TWO_CLOCKS = { ...VALUES, timestep_limit: 0.08, timestep_limit_held: 0.08, control_period_limit: 0.104, minimum_over_poses_held: 0.09, timestep_limit_motion: 0.018, motion_speed: 22 };
+
+test("the motion limits the timestep, not the control period", () => {
+  assert.match(verdict(sampled(0.05, { stability: TWO_CLOCKS })).sentence, /^A control period of 50 ms is within the limit 104 ms, at the setpoint/);
+  const coarse = verdict(sampled(0.05, { stability: TWO_CLOCKS, ...at(0.025) }));
+  assert.match(coarse.sentence, /^25 ms is above the limit 18 ms, moving at 22 rad\/s/);
+  assert.deepEqual([coarse.kind, coarse.slow, coarse.advised < 0.018], ["beyond", false, true]);
+  const shaking = sampled(0.2, { stability: { ...TWO_CLOCKS, timestep_limit: 0 } });
+  assert.match(limitInForce(shaking).where, /^at the setpoint/, "its speed is that of the shaking");
+  keepAnswer(shaking, shaking.limits.loop, "rk4", TWO_CLOCKS);
+  assert.deepEqual(shaking.limits.motions, {});
+  const noController = { gains: noGains(2), stability: TWO_CLOCKS };
+  assert.deepEqual(verdict(sampled(0.05, noController)), verdict(arm(noController)));
 });
 
 test("a control period below the timestep, or without a controller, changes nothing", () => {
@@ -215,9 +231,4 @@ test("a multiple of the gains is recognised, so the map stays and the dot moves"
   const base = { kp: [1000, 250], ki: [3000, 0], kd: [110, 22] };
   assert.ok(Math.abs(factorOf(scaled(base, 2.5), base) - 2.5) < 1e-12);
   for (const other of [{ ...base, kd: [110, 44] }, { ...base, ki: [3000, 1] }, null]) assert.ok(Number.isNaN(factorOf(other, base)));
-});
-
-test("without gains the arm is free", () => {
-  assert.ok(isFree(noGains(3)));
-  assert.ok(!isFree({ ...noGains(2), kd: [0, 1] }));
 });
