@@ -7,10 +7,8 @@ prefix=$2
 mkdir -p "$prefix/bin"
 # On Windows a program has an extension.
 case $program in *.exe) file=pendularm.exe ;; *) file=pendularm ;; esac
-# A running program cannot be written, but its name can get another file.
-cp "$program" "$prefix/bin/$file.new"
-chmod 755 "$prefix/bin/$file.new"
-mv -f "$prefix/bin/$file.new" "$prefix/bin/$file"
+# It makes a new file, because that of a running program cannot be written.
+install -m 755 "$program" "$prefix/bin/$file"
 "$program" completions --help >/dev/null 2>&1 || exit 0
 
 completions() { # shell, folder, file

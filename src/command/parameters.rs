@@ -3,6 +3,8 @@
 //! **Invariant:** a printed parameter can be set again in the same form. The exit status of diagnostics is 0 only if
 //! every part is OK.
 
+use std::collections::BTreeMap;
+
 use clap::{Args, Subcommand};
 use serde::Deserialize;
 use serde_json::value::RawValue;
@@ -113,25 +115,7 @@ struct DiagnosedPart {
     level: u8,
     name: String,
     message: String,
-    values: Vec<DiagnosedValue>,
-}
-
-/// A value of a part.
-#[derive(Deserialize)]
-struct DiagnosedValue {
-    key: String,
-    value: String,
-}
-
-impl DiagnosedPart {
-    /// Why it is not OK. The message of a part with a warning is that of a part without one.
-    fn reason(&self) -> &str {
-        let warning = self.values.iter().find(|one| one.key == "warning");
-        match warning {
-            Some(warning) if self.level == 1 => &warning.value,
-            _ => &self.message,
-        }
-    }
+    values: Vec<BTreeMap<String, String>>,
 }
 
 pub(super) async fn diagnostics(session: &mut Session) -> Outcome {
@@ -142,10 +126,13 @@ pub(super) async fn diagnostics(session: &mut Session) -> Outcome {
     session.show(&message, "")?;
     match status.into_iter().find(|part| part.level != 0) {
         None => Ok(()),
-        Some(part) => Err(CommandError::Refused(format!(
-            "{}: {}",
-            part.name,
-            part.reason()
-        ))),
+        Some(part) => {
+            // With a warning the message is the same as without one.
+            let mut values = part.values.iter().filter(|_| part.level == 1);
+            let warning = values.find(|one| one.get("key").is_some_and(|key| key == "warning"));
+            let why = warning.and_then(|one| one.get("value"));
+            let why = why.unwrap_or(&part.message);
+            Err(CommandError::Refused(format!("{}: {why}", part.name)))
+        }
     }
 }
