@@ -63,8 +63,9 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   const diverged = state.diagnostics?.state === "diverged";
   const held = free && doublingTime(method, state.integrator.timestep, answer) > SLOW_GROWTH ? Infinity : heldLimit(state, answer);
   const fast = diverged || state.integrator?.timestep > held || periodIsTooLong(state, answer);
-  const before = state.limits.motions[method];
-  // An arm that has diverged or shakes is fast because of that, so its earlier motion counts.
+  // An arm that has diverged or shakes is fast because of that. Of a free arm the earlier motion counts, which comes again
+  // after a reset. A controlled arm then begins at rest.
+  const before = free ? state.limits.motions[method] : undefined;
   const motion = fast ? before?.limit ?? Infinity : open(answer.timestep_limit_motion);
   const speed = fast ? before?.speed : answer.motion_speed;
   const pose = answer.equilibrium ?? (free ? null : state.setpoint.subarray(0, links));

@@ -60,7 +60,7 @@ for (const [name, changed, wanted] of VERDICTS) {
 test("beyond the limit, or after divergence, the limit of the pose counts instead of the motion's", () => {
   const thrashing = { ...VALUES, timestep_limit_motion: 1e-150, motion_speed: 5.6e156, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" };
   for (const changed of [{ integrator: { method: "rk4", timestep: 0.02 } }, { integrator: { method: "rk4", timestep: 0.02 }, diagnostics: { state: "diverged" } }]) {
-    const found = limitInForce(arm({ stability: thrashing, ...changed }));
+    const found = limitInForce(arm({ stability: thrashing, motions: { rk4: { limit: 1e-6, speed: 1e6 } }, ...changed }));
     assert.deepEqual([found.limit, found.everyPose], [VALUES.timestep_limit_held, VALUES.minimum_over_poses_held]);
     assert.match(found.where, /^at the setpoint/);
     assert.equal(found.advised, 0.8 * VALUES.minimum_over_poses_held);
