@@ -57,7 +57,7 @@ function open(served) {
 /** The limit of the active loop with a method [s], and its pose or speed. */
 export function limitInForce(/** @type {any} */ state, /** @type {string} */ method = state.integrator?.method) {
   const answer = answerInForce(state, method);
-  const free = state.enabled === false || (state.gains != null && isFree(state.gains));
+  const free = !acts(state);
   const { links } = state;
   if (!answer) return { limit: NaN, where: "", place: "", everyPose: NaN, everyPoseAtRest: NaN, advised: NaN };
   const diverged = state.diagnostics?.state === "diverged";
@@ -102,9 +102,8 @@ export function keepAnswer(/** @type {any} */ state, /** @type {string} */ asked
   if (state.limits.loop !== asked) state.limits = { loop: asked, answers: {}, motions: {} };
   const { answers, motions } = state.limits;
   answers[method] = answer;
-  // A diverging simulation is fast because of that, even at the first answer, so the motion's earlier limit is kept.
-  const isAway = state.diagnostics?.state === "diverged" || (state.enabled && state.integrator.timestep > open(answer?.timestep_limit_held)) || (answer && periodIsTooLong(state, answer));
-  if (answer && !isAway) motions[method] ??= { limit: open(answer.timestep_limit_motion), speed: answer.motion_speed };
+  // Only a free arm's earlier motion counts. A diverging simulation is fast because of that, even at the first answer.
+  if (answer && !acts(state) && state.diagnostics?.state !== "diverged") motions[method] ??= { limit: open(answer.timestep_limit_motion), speed: answer.motion_speed };
 }
 
 /**
@@ -241,7 +240,7 @@ export function whyText(/** @type {any} */ state) {
   const { method } = state.integrator;
   const answer = answerInForce(state, method);
   const limit = limits[method];
-  if (state.enabled === false || isFree(state.gains)) return whyFree(answer, method, limit);
+  if (!acts(state)) return whyFree(answer, method, limit);
   if (limit === Infinity) return "";
   return limit === 0 ? `Why: ${cause(answer, limit)}` : `Why ${duration(limit)}: ${cause(answer, limit)} ${others(limits)}`;
 }
