@@ -48,9 +48,12 @@ results_folder() {
 
 # Prints the environment of the figures. $1: the given command.
 environment() {
+    local changed
+    # Without kept figures, because new ones may already be written over them.
+    changed=$(git -C "$root" status --porcelain --untracked-files=no -- . ':!benches/results' 2>/dev/null || true)
     echo "command:   $1"
     echo "date:      $(date -u +%FT%TZ)"
-    echo "commit:    $(git -C "$root" describe --always --dirty 2>/dev/null || echo unknown)"
+    echo "commit:    $(git -C "$root" describe --always 2>/dev/null || echo unknown)${changed:+-dirty}"
     echo "processor: $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -n 1), $(getconf _NPROCESSORS_ONLN) cores"
     echo "system:    $(uname -s) $(uname -r | cut -d- -f1)"
     echo "rustc:     $(cd "$root" && rustc --version), $(cd "$root" && rustc -vV | sed -n 's/^host: //p'), no flags beyond the release profile"

@@ -128,14 +128,6 @@ fn main() {
     // Some places are kept for HTTP.
     let options = ["--bind", "127.0.0.1:0", "--clients", "300", "--log", "warn"];
     let program = Program::start(path, &options).expect("the runtime starts");
-    let ours = Server {
-        protocol: Protocol::Pendularm,
-        address: program.address,
-        pid: program.pid(),
-        rest: 0.0,
-    };
-    let peers = words.map(|text| server(text));
-    let mut servers: Vec<Server> = std::iter::once(ours).chain(peers).collect();
     let plan = if quick {
         Plan {
             rounds: 1,
@@ -151,9 +143,16 @@ fn main() {
             bars: true,
         }
     };
-    for server in &mut servers {
-        server.rest = rest(server, plan.seconds);
-    }
+    let ours = (Protocol::Pendularm, program.address, program.pid());
+    let servers: Vec<Server> = std::iter::once(ours)
+        .chain(words.map(|text| peer(text)))
+        .map(|(protocol, address, pid)| Server {
+            protocol,
+            address,
+            pid,
+            rest: rest(pid, plan.seconds),
+        })
+        .collect();
     report::print_rest(&servers);
     let mut verdicts = Vec::new();
     for scene in &SCENES {
@@ -177,27 +176,24 @@ fn print_free_ports(count: usize) {
     }
 }
 
-fn server(text: &str) -> Server {
+fn peer(text: &str) -> (Protocol, SocketAddr, u32) {
     let parts: Vec<&str> = text.split('=').collect();
     let [name, address, pid] = parts[..] else {
         panic!("{text} is not SERVER=ADDRESS=PID")
     };
-    Server {
-        protocol: *Protocol::ALL
-            .iter()
-            .find(|one| one.name() == name)
-            .expect("a server that we know"),
-        address: address.parse().expect("an address"),
-        pid: pid.parse().expect("a process id"),
-        rest: 0.0,
-    }
+    let protocol = Protocol::ALL.into_iter().find(|one| one.name() == name);
+    (
+        protocol.expect("a server that we know"),
+        address.parse().expect("an address"),
+        pid.parse().expect("a process id"),
+    )
 }
 
 /// Processor time that a server takes in a second without clients \[ns\].
-fn rest(server: &Server, seconds: f64) -> f64 {
-    let (before, began) = (processor(server.pid), Instant::now());
+fn rest(pid: u32, seconds: f64) -> f64 {
+    let (before, began) = (processor(pid), Instant::now());
     std::thread::sleep(Duration::from_secs_f64(seconds));
-    (processor(server.pid) - before) as f64 / began.elapsed().as_secs_f64()
+    (processor(pid) - before) as f64 / began.elapsed().as_secs_f64()
 }
 
 /// Plays a scene to each server in turn for all rounds, then once more with probes.
@@ -216,7 +212,7 @@ fn play(scene: &Scene, servers: &[Server], plan: &Plan) -> Vec<(Protocol, Played
             let server = servers[index];
             // It changes in minutes by more than few deliveries take, so then it is measured beside them.
             let at_rest = if scene.is_light() {
-                rest(server, plan.seconds)
+                rest(server.pid, plan.seconds)
             } else {
                 server.rest
             };
