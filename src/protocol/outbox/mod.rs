@@ -109,6 +109,7 @@ impl Outbox {
         self.keep_to_queue_length(topic);
         self.drop_old(now);
         self.keep_bounded();
+        self.check_sums();
     }
 
     /// Adds feedback of a goal. It may be dropped like a message, but no throttle holds it back, not even that of
@@ -206,6 +207,7 @@ impl Outbox {
             }));
         }
         self.is_behind &= !self.topics.is_empty();
+        self.check_sums();
     }
 
     /// The unwritten bytes of the frames that are being written.
@@ -226,10 +228,11 @@ impl Outbox {
                 }
             }
             if !frame.rest.is_empty() {
-                return;
+                break;
             }
             self.writing.pop_front();
         }
+        self.check_sums();
     }
 
     /// Whether a long topic message waits or is being written. Messages that are held back do not count.
@@ -306,6 +309,28 @@ impl Outbox {
         if let Some(replaced) = replaced {
             self.drop_message(replaced);
         }
+    }
+
+    /// Compares the sums with the messages that they are of. Builds without debug assertions omit it.
+    fn check_sums(&self) {
+        let queued = || self.topics.iter();
+        let held = || self.limits.values().flat_map(|limits| &limits.held);
+        let bytes = |message: &QueuedMessage| counted(&message.frame);
+        debug_assert_eq!(self.topic_bytes, queued().map(bytes).sum::<usize>());
+        debug_assert_eq!(self.held.bytes, held().map(bytes).sum::<usize>());
+        debug_assert_eq!(self.held.count, held().count());
+        debug_assert!(self.kept_old <= self.topics.len());
+        let waiting = self.responses.iter();
+        let waiting = waiting.map(|(_, frame)| (frame.len(), frame.len()));
+        let writing = self.writing.iter().filter(|frame| frame.is_response);
+        let writing = writing.map(|frame| (frame.rest.len(), frame.length));
+        let responses = || waiting.clone().chain(writing.clone());
+        let short = responses().filter(|(_, length)| *length <= SHORT);
+        debug_assert_eq!(self.short_bytes, short.map(|(rest, _)| rest).sum::<usize>());
+        debug_assert_eq!(
+            self.response_bytes,
+            responses().map(|(rest, _)| rest).sum::<usize>()
+        );
     }
 }
 
