@@ -166,6 +166,12 @@ mod tests {
         for length in 0..bytes.len() {
             assert!(decode(one, &bytes[..length]).is_err(), "{length}");
         }
+        let length = bytes.len() - 1;
+        assert_eq!(
+            decode(one, &bytes[..length]),
+            Err(CdrError::Short(length)),
+            "the length includes that of the header"
+        );
     }
 
     #[test]

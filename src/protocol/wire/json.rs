@@ -463,4 +463,14 @@ mod tests {
         assert_eq!((first, entries.count), (vec!["1", "2"], 4));
         assert_eq!(entries.last.map(RawValue::get), Some("4"));
     }
+
+    #[test]
+    fn the_line_counts_if_it_is_another_text() {
+        let read = |text: &str| Payload::from(RawValue::from_string(text.to_owned()).unwrap());
+        let (short, long) = (read("[1,2]"), read("[1,\n2]"));
+        assert_ne!(long.get(), long.line());
+        let more = long.get().len() - short.get().len() + long.line().len();
+        assert_eq!(long.allocated(), short.allocated() + more);
+        assert!(short.allocated() > short.get().len());
+    }
 }
