@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs the browser tests against the binary that `PENDULARM` names: `python3 tests/browser/run.py [-k part of a name]`.
 
-Most of a test's time is waiting for an arm that moves as fast as a real one, so two files run at a time, each with its own browser.
+Most of a test's time is waiting for an arm that moves as fast as a real one, so three files run at a time, each with its own browser.
 """
 
 import concurrent.futures
@@ -10,9 +10,10 @@ import pathlib
 import re
 import subprocess
 import sys
+import unittest
 
 FOLDER = pathlib.Path(__file__).parent
-AT_A_TIME = 2
+AT_A_TIME = 3
 
 
 def run(path):
@@ -27,7 +28,8 @@ if __name__ == "__main__":
     with concurrent.futures.ThreadPoolExecutor(AT_A_TIME) as threads:
         results = []
         # Those with most tests first: a long one that begins last would run alone.
-        for result in threads.map(run, sorted(FOLDER.glob("test_*.py"), key=lambda path: -path.read_text().count("    def test_"))):
+        loader = unittest.defaultTestLoader
+        for result in threads.map(run, sorted(FOLDER.glob("test_*.py"), key=lambda path: -loader.loadTestsFromName(path.stem).countTestCases())):
             results.append(result)
             if result[1] > 0:
                 print(result[0], flush=True)
