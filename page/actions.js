@@ -2,7 +2,7 @@
 // reset.
 // Invariant: every change can be undone, and refusals are shown.
 
-import { announce, byId } from "./dom.js";
+import { announce, byId, passFocus } from "./dom.js";
 import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, setState } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
 import { state, tell, watch } from "./store.js";
@@ -17,7 +17,9 @@ export function remember() {
 }
 
 function showUndo() {
-  byId("undo").disabled = !undo.leadsBackFrom(presentSettings(state));
+  const leadsBack = undo.leadsBackFrom(presentSettings(state));
+  if (!leadsBack) passFocus(byId("undo"));
+  byId("undo").disabled = !leadsBack;
 }
 
 export function startActions() {

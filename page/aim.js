@@ -5,6 +5,7 @@
 import { warn } from "./dom.js";
 import { endEffector, showAim, toWorld } from "./arm_view.js";
 import { goalOptions, showGoalPlace, showGoalRefusal } from "./tasks_panel.js";
+import { inPageNames } from "./format.js";
 import { latestOnly } from "./latest.js";
 import { nearestInReach, nearestTurn } from "./mechanics.js";
 import { cancelGoal, sendGoal, sendSetpoint, setState, solve } from "./runtime.js";
@@ -41,8 +42,9 @@ const lift = latestOnly(async (place) => {
 function report(place, answer) {
   place.refused = !answer.result;
   place.answered = true;
-  showGoalRefusal(answer.result ? "" : answer.status);
-  if (!answer.result) warn(answer.status);
+  const refusal = answer.result ? "" : inPageNames(answer.status);
+  showGoalRefusal(refusal);
+  if (refusal) warn(refusal);
   if (!aim) {
     if (place === lastPlace) finish(place);
   } else if (aim.refused !== place.refused) {

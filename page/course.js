@@ -33,6 +33,8 @@ const ALL = 4;
 /** The required reduction of the method's error. */
 const MUCH = 100;
 const SOME_SCENES = 3;
+/** Energy counts as kept if its total varies by at most this [J] for this time [s]. Euler exceeds it within a second. */
+const [KEPT, LONG] = [0.5, 3];
 
 /** @param {number} links @param {number} period @param {Partial<Settings>} [changed] @returns {Settings} */
 function controlled(links, period, changed = {}) {
@@ -106,10 +108,10 @@ export const STEPS = [
     text: "More damping or less mass makes the arm react faster: the controller must measure more often. The limit is about T = 2 λmin(Kd⁻¹ M). M is the mass matrix, Kd the damping, λmin the smallest eigenvalue.",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "map", dial: "damping",
-    task: { text: "Change the damping until this period is stable.", done: ({ stable }) => stable },
+    task: { text: "Change the damping or the mass until this period is stable.", done: ({ stable }) => stable },
     question: {
       text: "You halve the damping. What does the limit do?", answers: ["It halves", "It doubles", "It stays"], right: 1,
-      because: "In the formula the damping is in the denominator: half of it gives twice the time.",
+      because: "In the formula the damping is in the denominator: half of it gives twice the time. With far too little damping no period is stable.",
     },
   },
   {
@@ -117,7 +119,7 @@ export const STEPS = [
     text: "Nothing drives this swing, so its energy should stay constant. Euler at 5 ms adds a little at every step. Choose methods and watch the total.",
     scene: (links) => ({ ...structuredClone(DEFAULTS[links]), integrator: { method: "euler", timestep: 0.005 }, controller: false }),
     chart: "energy", dial: "timestep", methods: true,
-    task: { text: "Find a method that keeps the energy at 5 ms.", done: ({ methods }) => [...methods].some((method) => method !== "euler") },
+    task: { text: "Find a method that keeps the energy at 5 ms for 3 s.", done: ({ energy }) => energy.high - energy.low <= KEPT && energy.until - energy.since >= LONG },
     question: {
       text: "Can Euler keep the energy with a shorter step?", answers: ["Yes, below 1 ms", "No, the energy only grows more slowly", "Yes, below 0.1 ms"], right: 1,
       because: "Without damping every Euler step makes a swing a little wider, however short the step is.",
@@ -130,16 +132,16 @@ export const STEPS = [
     chart: "ladder", dial: null,
     task: { text: "Measure the four methods.", done: ({ measured }) => measured },
     question: {
-      text: "Your controller measures every 4 ms. What does Runge–Kutta 4 at 0.25 ms improve?", answers: ["The robot", "Nearly nothing", "The limit"], right: 1,
+      text: "The control period stays the same. What does Runge–Kutta 4 at 0.25 ms improve?", answers: ["The robot", "Nearly nothing", "The limit"], right: 1,
       because: "The error of the hold is far larger than the error of the method. Reduce the larger one first.",
     },
   },
   {
     id: "extreme", title: "Stiff and extreme",
-    text: "Thirty-nine arms that are hard to simulate: light links, high gains, extreme numbers. Click a picture to start its scene. Some scenes need three links. The sentence describes a correct simulation.",
+    text: "Thirty-nine arms that are hard to simulate: light links, high gains, extreme numbers. Click a picture to start its scene. Some scenes need another number of links. The sentence describes a correct simulation.",
     scene: (links) => structuredClone(DEFAULTS[links]),
     chart: "pictures", dial: null,
-    task: { text: "Start three of them.", done: ({ scenes }) => scenes >= SOME_SCENES },
+    task: { text: "Start three of them.", done: ({ scenes }) => scenes.size >= SOME_SCENES },
     question: {
       text: "Why does a last link of one milligram need short steps?", answers: ["It is hard to see", "It reacts very fast", "It stores much energy"], right: 1,
       because: "The same gain moves less mass faster, and a fast motion needs a short step.",
@@ -168,9 +170,20 @@ export function nothingSeen() {
     gain: 1, // factor by which the method's error has decreased
     stable: false, // whether the active loop is stable
     measured: false, // whether the ladder is complete
-    scenes: 0, // number of started scenes
+    scenes: /** @type {Set<string>} */ (new Set()), // started scenes
+    energy: { of: "", since: 0, until: 0, low: 0, high: 0 }, // of the free swing; see `followEnergy`
     sheet: false, // whether a sheet was made
   };
+}
+
+/**
+ * The range of the total energy [J] since a time [s]. The range begins again with other settings `of` the arm, after a reset, and
+ * when it is too wide.
+ * @param {Seen["energy"]} range @param {string} of @param {number} time @param {number} total
+ */
+export function followEnergy({ of: before, since, until, low, high }, of, time, total) {
+  const wider = { of, since, until: time, low: Math.min(low, total), high: Math.max(high, total) };
+  return of === before && time >= until && wider.high - wider.low <= KEPT ? wider : { of, since: time, until: time, low: total, high: total };
 }
 
 /** Whether a deviation decays: its last bars compared with its first ones. @param {number[]} bars */

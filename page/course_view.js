@@ -4,11 +4,11 @@
 
 import { remember, setScene } from "./actions.js";
 import { Chart, drawBars, drawErrors, drawMap, drawPicture, ROOMY } from "./chart.js";
-import { ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
-import { announce, byId, el, setAddress, setAttribute, setText } from "./dom.js";
+import { followEnergy, ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
+import { announce, byId, el, passFocus, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
-import { duration, METHODS, seconds, shortName } from "./format.js";
-import { newest, VELOCITY } from "./history.js";
+import { duration, inPageNames, METHODS, seconds, shortName } from "./format.js";
+import { ENERGY, newest, record, VELOCITY } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
 import { drawLadder, settingsKey } from "./ladder_panel.js";
 import { isAlone } from "./kernel.js";
@@ -30,6 +30,8 @@ const STEPS_SHOWN = 40; // measurements shown in slow motion
 const ROWS = 13; // of the map's border
 const SPAN = 5; // s of the strip chart
 const ALL_JOINTS = [true, true, true];
+const MASSES = [0.5, 1, 2]; // of the last link [kg]
+const DIVERGED = "The arm diverged. Press “Restart step”.";
 
 /** A link without settings. */
 const ONLY_STEP = /^#?(?:links=[23])?&?(?:step=\w+)?&?$/;
@@ -77,6 +79,7 @@ function anew() {
     runsKey: "", // the settings of `runs`
     asked: "", // the settings of the chart
     border: /** @type {import("./chart.js").Row[]} */ ([]),
+    scene: "", // the sentence of the started scene
     borderAsked: "", // the arm and the gains without damping of the border
   };
 }
@@ -153,7 +156,7 @@ async function begin() {
   if (mine !== now) return;
   if (offset) await setState(offset.slice(0, state.links));
   if (mine !== now) return;
-  setText(byId("course-status"), refusals.join(" "));
+  setText(byId("course-status"), refusals.map(inPageNames).join(" "));
   now.ready = true;
   byId("course-dial").inert = false;
   look();
@@ -189,12 +192,14 @@ function damping() {
 
 function show() {
   const one = STEPS[at];
+  for (const part of ["dial", "extra", "question"]) passFocus(byId(`course-${part}`), byId("course-title"));
   setText(byId("course-number"), `Step ${at + 1} of ${STEPS.length}`);
   setText(byId("course-title"), one.title);
   setText(byId("course-text"), one.text);
   const lost = state.connection !== "open";
   setText(byId("course-status"), state.links === 0 || now.began ? "" : lost ? "The connection is lost. The page reconnects by itself." : "Press “Start” to set the arm. Other viewers see the change.");
   setText(byId("course-start"), now.began ? "Restart step" : "Start");
+  if (lost) passFocus(byId("course-start"), byId("course-title"));
   byId("course-start").disabled = state.links === 0 || lost;
   byId("course-back").disabled = at === 0;
   byId("course-next").disabled = at === STEPS.length - 1;
@@ -217,8 +222,8 @@ function fillExtra(one) {
     }, shortName(method)))));
   }
   if (one.chart === "map") {
-    place.append(el("div", { class: "buttons", role: "group", "aria-label": "mass of the last link" }, ...[0.5, 1, 4].map((mass) => el("button", {
-      type: "button", class: "small", onclick: () => setParams({ masses: [...state.params.masses.slice(0, -1), mass] }),
+    place.append(el("div", { class: "buttons", role: "group", "aria-label": "mass of the last link" }, ...MASSES.map((mass) => el("button", {
+      type: "button", class: "small", "data-mass": mass, onclick: () => setParams({ masses: [...state.params.masses.slice(0, -1), mass] }),
     }, `last link ${mass} kg`))));
   }
   if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure", onclick: ({ target }) => busy(target, "Measuring…", measure) }, "Measure"));
@@ -260,8 +265,8 @@ async function runScene(scene) {
   const refusals = await setScene({ ...settings, controller: settings.controller ?? false }, false);
   if (mine !== now) return;
   await setState(scene.start, scene.velocity);
-  setText(byId("course-status"), refusals.length > 0 ? `Refused: ${refusals.join(" ")}` : `${scene.name}: ${scene.expected}`);
-  now.seen.scenes += 1;
+  now.scene = refusals.length > 0 ? `Refused: ${refusals.map(inPageNames).join(" ")}` : `${scene.name}: ${scene.expected}`;
+  if (refusals.length === 0) now.seen.scenes.add(scene.id);
   look();
 }
 
@@ -309,8 +314,12 @@ function showBig() {
   const caption = CHARTS[one.chart].caption();
   setText(byId("course-caption"), caption);
   setAttribute(byId("course-chart"), "aria-label", caption);
+  byId("course-big").classList.toggle("good", !unknown && ["stable", "here"].includes(kind));
   byId("course-big").classList.toggle("bad", !unknown && ["beyond", "never", "diverged"].includes(kind));
-  if (kind === "diverged" && one.chart !== "pictures") setText(byId("course-status"), "The arm diverged. Press “Restart step”.");
+  const status = byId("course-status");
+  if (now.scene) setText(status, kind === "diverged" ? `${now.scene} This simulation diverged.` : now.scene);
+  else if (kind === "diverged" && one.chart !== "pictures") setText(status, DIVERGED);
+  else if (status.textContent === DIVERGED) setText(status, "");
 }
 
 function showTask() {
@@ -326,10 +335,15 @@ function showTask() {
   if (place.dataset.shown === key) return;
   place.dataset.shown = key;
   place.replaceChildren();
-  if (guess && began && guessed < 0) ask(place, guess, -1, (k) => { now.guessed = k; show(); });
+  if (guess && began && guessed < 0) ask(place, guess, -1, (k) => { now.guessed = k; show(); byId("course-dial").querySelector("input")?.focus({ preventScroll: true }); });
   else if (ticked) {
     if (guess) place.append(el("p", { class: "note" }, `${guessed === guess.right ? "Your guess was right." : `You guessed ${guess.answers[guessed]}.`} ${guess.because}`));
-    ask(place, question, answered, (k) => { now.answered = k; showTask(); announce(k === question.right ? `Right. ${question.because}` : "Not that one. Try again."); });
+    ask(place, question, answered, (k) => {
+      now.answered = k;
+      showTask();
+      place.querySelector("[aria-pressed=true]")?.focus({ preventScroll: true });
+      announce(k === question.right ? `Right. ${question.because}` : "Not that one. Try again.");
+    });
   }
 }
 
@@ -348,7 +362,7 @@ function look() {
   if (state.view !== "course" || state.links === 0 || !state.integrator || !state.gains) return;
   const one = STEPS[at];
   if (dial) dial.show();
-  for (const button of byId("course-extra").querySelectorAll("[data-method]")) button.setAttribute("aria-pressed", String(button.dataset.method === state.integrator.method));
+  showChosen();
   showBig();
   if (!now.ready) return;
   const { seen } = now;
@@ -360,7 +374,9 @@ function look() {
   seen.shook ||= state.enabled && period() > controlPeriodLimit(state) && (fastest > SHAKES || kind === "diverged");
   seen.stable = state.enabled === true && period() < controlPeriodLimit(state) && kind !== "diverged" && sceneIsSet;
   if (one.methods && one.chart === "velocity" && !sceneIsSet) seen.methods.clear();
-  if (one.chart === "energy" && (state.enabled !== false || state.integrator.timestep < 0.004)) seen.methods.clear();
+  if (one.chart === "energy" && state.enabled === false && state.integrator.timestep >= one.scene(state.links).integrator.timestep && record.length > 0) {
+    seen.energy = followEnergy(seen.energy, JSON.stringify([state.integrator, state.params]), newest(), record.data[record.last() + ENERGY]);
+  }
   refresh(one);
   if (!now.ticked && one.task.done(seen)) {
     now.ticked = true;
@@ -369,6 +385,15 @@ function look() {
     showBig();
   }
   showTask();
+}
+
+/** Marks the present method and mass among those that the step offers. */
+function showChosen() {
+  const { method } = /** @type {any} */ (state.integrator);
+  const mass = state.params?.masses.at(-1);
+  for (const button of byId("course-extra").querySelectorAll("[data-method], [data-mass]")) {
+    setAttribute(button, "aria-pressed", String((button.dataset.method ?? method) === method && Number(button.dataset.mass ?? mass) === mass));
+  }
 }
 
 /** Requests the chart's data again, when its settings have changed. */
@@ -441,7 +466,7 @@ async function measure() {
   const key = settingsKey();
   Object.assign(now, { runs: [], runsKey: key });
   const refused = await climb(1, () => mine === now && key === settingsKey(), (rung) => { mine.runs.push(rung); surface.redraw(); });
-  setText(byId("course-status"), refused);
+  setText(byId("course-status"), inPageNames(refused));
   mine.seen.measured = mine.runs.length === rungs().length;
   look();
 }

@@ -40,6 +40,11 @@ export function setAddress(address) {
   }
 }
 
+/** Call this before `place` disappears or is disabled: if the focus is in it, it moves to `next`, and not to the start of the page. */
+export function passFocus(place, next = byId("arm")) {
+  if (place.contains(document.activeElement)) next.focus({ preventScroll: true });
+}
+
 /** Writes text only if it differs, because most readouts rarely change. */
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;

@@ -2,7 +2,7 @@
 // Invariant: the field has the present value, except while a user changes it.
 
 import { el, setText, warn } from "./dom.js";
-import { plain, significant } from "./format.js";
+import { inPageNames, plain, significant } from "./format.js";
 import { latestOnly } from "./latest.js";
 import { watch } from "./store.js";
 
@@ -16,12 +16,13 @@ export function refusal(...describes) {
   nextId += 1;
   for (const one of describes) one.setAttribute("aria-describedby", text.id);
   const show = (status) => {
-    setText(text, status);
+    const words = inPageNames(status);
+    setText(text, words);
     for (const one of describes) {
       if (status) one.setAttribute("aria-invalid", "true");
       else one.removeAttribute("aria-invalid");
     }
-    if (status) warn(status);
+    if (words) warn(words);
   };
   // Call this after a new connection, or when all settings are set again.
   watch("connection", (now) => { if (now === "open") show(""); });
@@ -39,11 +40,13 @@ export function refusal(...describes) {
 export async function busy(button, text, work) {
   if (button.disabled) return;
   const before = button.textContent;
+  const hadFocus = document.activeElement === button; // a disabled button loses it
   button.disabled = true;
   setText(button, text);
   await work();
   button.disabled = false;
   setText(button, before);
+  if (hadFocus && document.activeElement === document.body) button.focus();
 }
 
 /**

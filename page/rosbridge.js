@@ -2,8 +2,6 @@
 // connection.
 // Invariant: a promise of `call` is always fulfilled, with `result: false` and a reason if there is no answer.
 
-import { inPageNames } from "./format.js";
-
 const FIRST_RETRY_MS = 300;
 const LAST_RETRY_MS = 4000;
 const CALL_TIMEOUT_MS = 15000;
@@ -78,7 +76,7 @@ export class Rosbridge {
     if (!call) return;
     this.calls.delete(id);
     clearTimeout(call.timer);
-    call.settle({ values: values ?? {}, result: result === true, status: inPageNames(status ?? "") });
+    call.settle({ values: values ?? {}, result: result === true, status: status ?? "" });
   }
 
   send(frame) {

@@ -2,7 +2,7 @@
 // Invariant: the values of every answer are stored, so the page shows values that the runtime accepted.
 
 import { announce, warn } from "./dom.js";
-import { METHODS } from "./format.js";
+import { inPageNames, METHODS } from "./format.js";
 import { Kernel, isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
 import { answerInForce, keepAnswer, motionHasChanged, question } from "./policy.js";
@@ -39,7 +39,7 @@ export function start(whenReset, whenChanging) {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   const dial = isAlone ? () => new Kernel() : () => new WebSocket(`${scheme}://${location.host}/`);
   bridge = new Rosbridge(dial, connection);
-  bridge.onStatus = (text) => warn(text);
+  bridge.onStatus = (text) => warn(inPageNames(text));
   bridge.subscribe("/joint_states", jointStates);
   bridge.subscribe("/joint_trajectory", trajectory);
   bridge.subscribe("/diagnostics", diagnostics);
@@ -170,6 +170,8 @@ function diagnostics(msg) {
   }
   const before = state.diagnostics?.state;
   if (report.state !== "diverged") keep("paused", report.state === "paused");
+  // Limits of an arm that diverges are those of its wild motion.
+  if (before === "diverged" && report.state !== before) set("limits", nothingAsked());
   set("diagnostics", report);
   keep("diverged", report.state === "diverged");
   if (motionHasChanged(answerInForce(state), report)) askNow();

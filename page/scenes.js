@@ -51,9 +51,9 @@ export const SCENES = [
   {"id": "S34", "name": "parameters that are no numbers", "links": 2, "expected": "Refused, with the reason.", "start": [0, 0], "settings": {"params": {"gravity": 9.81, "masses": [-1, 1], "lengths": [1, 1]}}, "hidden": "refused by name"},
   {"id": "S35", "name": "massless link", "links": 2, "expected": "Refused, with the reason.", "start": [0, 0], "settings": {"params": {"gravity": 9.81, "masses": [0, 1], "lengths": [1, 1]}}, "hidden": "refused by name"},
   {"id": "S36", "name": "one joint", "links": 0, "expected": "20 000 oscillators; only in the report.", "start": [0], "settings": {}, "hidden": "has one joint"},
-  {"id": "S37", "name": "another method, another timestep", "links": 3, "expected": "Change the method while it swings.", "start": [0.3, -1.2, 2], "settings": {}, "watch": {"seconds": 5}},
-  {"id": "S38", "name": "there and back", "links": 2, "expected": "Backwards it returns, almost.", "start": [0.5, -0.5], "settings": {"integrator": {"method": "rk4", "timestep": 0.004}}, "watch": {"seconds": 2}},
-  {"id": "S39", "name": "step doubling", "links": 3, "expected": "Two half steps show the error of one.", "start": [0.3, -1.2, 2], "settings": {}, "watch": {"seconds": 5}},
+  {"id": "S37", "name": "another method, another timestep", "links": 3, "expected": "Change the method in the Workbench while it swings.", "start": [0.3, -1.2, 2], "settings": {}, "watch": {"seconds": 5}},
+  {"id": "S38", "name": "there and back", "links": 2, "expected": "A free swing. The report runs it back again.", "start": [0.5, -0.5], "settings": {"integrator": {"method": "rk4", "timestep": 0.004}}, "watch": {"seconds": 2}},
+  {"id": "S39", "name": "step doubling", "links": 3, "expected": "A free swing. The report compares half steps.", "start": [0.3, -1.2, 2], "settings": {}, "watch": {"seconds": 5}},
 ];
 
 /** All settings of a scene. @param {Scene} scene @returns {Settings} */

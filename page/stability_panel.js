@@ -10,7 +10,7 @@ import { shrinks } from "./course.js";
 import { byId, el, setText } from "./dom.js";
 import { duration, methodName, METHODS } from "./format.js";
 import { latestOnly } from "./latest.js";
-import { answerInForce, factorOf, limitInForce, limitText, question, scaled, stepsPerUpdate, whyText } from "./policy.js";
+import { answerInForce, factorOf, isFree, limitInForce, limitText, question, scaled, stepsPerUpdate, whyText } from "./policy.js";
 import { setGains, setIntegrator } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { LOOP, state, watch } from "./store.js";
@@ -138,7 +138,9 @@ const push = latestOnly(async ({ loop, key }) => {
   const found = await deviation({ setpoint: rest, ...loop, integrator, timestep }, rest, steps * timestep);
   if (key !== pushAsked || !found) return;
   heights = found;
-  setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${steps > 1 ? "a control period of " : ""}${duration(steps * timestep)}: the push ${shrinks(heights) ? "dies away" : "does not die away"} within ${LOOKS} ${steps > 1 ? "measurements" : "steps"}.`);
+  const outcome = isFree(loop.gains) ? "the push becomes a swing, which nothing damps"
+    : `the push ${shrinks(heights) ? "dies away" : "does not die away"} within ${LOOKS} ${steps > 1 ? "measurements" : "steps"}`;
+  setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${steps > 1 ? "a control period of " : ""}${duration(steps * timestep)}: ${outcome}.`);
   bars.redraw();
 }, ASK_MS);
 

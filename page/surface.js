@@ -7,6 +7,9 @@
 
 import { colors, onTheme } from "./theme.js";
 
+/** Paper has another width than the window, and no frames come while a page is printed. */
+const paper = matchMedia("print");
+
 export class Surface {
   /**
    * @param {HTMLCanvasElement} canvas @param {() => void} paint paints everything on an empty
@@ -62,6 +65,7 @@ export class Surface {
     this.canvas.height = Math.max(1, height);
     this.context.setTransform(density, 0, 0, density, 0, 0);
     this.onResize();
+    if (paper.matches) draw(performance.now());
   }
 
   /** Fills it with the background's colour. */

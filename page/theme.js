@@ -6,6 +6,8 @@ import { byId, keepChoice, remembered } from "./dom.js";
 const KEY = "pendularm-theme";
 const NAMES = ["page", "panel", "ink", "muted", "line", "grid", "accent", "good", "warn", "bad", "target", "joint1", "joint2", "joint3", "kinetic", "potential", "stable", "unstable", "method1", "method2", "method3", "method4"];
 const dark = matchMedia("(prefers-color-scheme: dark)");
+/** Paper is always light, and the user may choose the colours of all elements except the canvases. */
+const others = [matchMedia("print"), matchMedia("(forced-colors: active)")];
 const listeners = [];
 
 /** Colours by name, from the present theme; `joints` and `methods` in their order. */
@@ -35,7 +37,7 @@ function apply(choice) {
 
 export function startTheme() {
   apply(remembered(KEY));
-  dark.addEventListener("change", read);
+  for (const one of [dark, ...others]) one.addEventListener("change", read);
   byId("theme").addEventListener("click", () => {
     const isDark = (document.documentElement.dataset.theme ?? (dark.matches ? "dark" : "light")) === "dark";
     const choice = isDark ? "light" : "dark";

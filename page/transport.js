@@ -3,7 +3,7 @@
 
 import { beginAnew, recover, resetArm } from "./actions.js";
 import { switchController, takeSuggestion } from "./controls.js";
-import { announce, byId, el, setText, warn } from "./dom.js";
+import { announce, byId, el, passFocus, setText, warn } from "./dom.js";
 import { refusal } from "./field.js";
 import { duration, fixed } from "./format.js";
 import { limitInForce, verdict } from "./policy.js";
@@ -57,6 +57,7 @@ function showNotice() {
     return;
   }
   shownNotice = key;
+  passFocus(box);
   box.className = notice ? `notice ${notice.kind}` : "notice";
   box.hidden = !notice;
   byId("stage").classList.toggle("diverged", notice?.key === "diverged");

@@ -6,7 +6,8 @@
 import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
 import { chooseLinks, followLink, stepInLink } from "./course_view.js";
-import { announce, byId, el, setAddress, setText } from "./dom.js";
+import { announce, byId, el, passFocus, setAddress, setText } from "./dom.js";
+import { inPageNames } from "./format.js";
 import { isAlone } from "./kernel.js";
 import { fromFragment, presentSettings, toFragment } from "./settings.js";
 import { set, state, watch } from "./store.js";
@@ -123,14 +124,17 @@ function offer() {
   if (banner.hidden) return;
   const given = new URLSearchParams(location.hash.slice(1));
   const text = [...given].filter(([name]) => name !== "links" && name !== "step").map(([name, value]) => `${name} ${value}`).join(" · ").slice(0, 300);
-  const done = () => { banner.hidden = true; };
+  const done = () => {
+    passFocus(banner);
+    banner.hidden = true;
+  };
   const refused = el("p", { class: "refusal" });
   banner.replaceChildren(
     el("p", {}, "This link has settings: ", el("span", { class: "offer-text" }, text)),
     el("button", { type: "button", class: "primary", onclick: async () => {
       remember();
       const refusals = await apply(settings);
-      setText(refused, refusals.join(" "));
+      setText(refused, refusals.map(inPageNames).join(" "));
       if (refusals.length === 0) done();
     } }, "Apply"),
     el("button", { type: "button", onclick: done }, "Ignore"), refused,

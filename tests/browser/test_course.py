@@ -1,5 +1,6 @@
 """The course: a step sets its scene on a click only, its task ticks itself, its answer is checked, and a link names it."""
 
+import math
 import time
 
 from stage import IS_FILE, PageTest
@@ -51,6 +52,7 @@ class Tasks(CourseTest):
         self.wait(lambda: self.values("/pid_controller/enable")["data"], "the controller")
         self.page.drag(self.on_canvas((1.9, 0.1)), self.on_canvas((0.6, 1.2)))
         self.done("the tip has arrived")
+        self.wait(lambda: math.dist(self.runtime.end_effector(), (0.6, 1.2)) < 0.02, "where the drag ended")
         self.answer("It sets them to zero")
         self.page.until("document.querySelector('#course-question .note').textContent.startsWith('Not that one')")
         self.answer("It holds the torques as they are")
@@ -105,6 +107,7 @@ class Tasks(CourseTest):
         self.step(6)
         self.page.until("document.querySelector('#course-figure').textContent === '5.5 of 4.3 ms'")
         self.wait(lambda: self.image("#course-chart").count(self.color("unstable")) > 500, "the map")
+        self.assertEqual(self.page.run("[...document.querySelectorAll('[data-mass][aria-pressed=true]')].map((one) => one.dataset.mass)"), ["1"])
         self.page.fill(DIAL, "0.5")
         self.done("stable")
         self.assertRegex(self.big(), r"^5\.5 of (8\.\d|9) ms$")
@@ -112,6 +115,8 @@ class Tasks(CourseTest):
     def test_the_energy_is_kept_by_another_method(self):
         self.step(7)
         self.page.click("#course-extra [data-method=rk4]")
+        time.sleep(1)
+        self.assertNotEqual(self.page.run("document.querySelector('#course-task').className"), "done", "its energy has yet to be seen")
         self.done("a method that keeps it")
         self.assertFalse(self.values("/pid_controller/enable")["data"])
 
@@ -130,7 +135,8 @@ class Tasks(CourseTest):
         self.page.click("#scene-S35")
         self.page.until("document.querySelector('#course-status').textContent.includes('mass 1 must be greater than 0')", why="refused, with the reason")
         self.page.click("#scene-S33")  # its grid has steps of 1e-161 m
-        self.page.until("document.querySelector('#run-state').textContent === 'diverged'")
+        self.page.until("document.querySelector('#course-status').textContent.endsWith('This simulation diverged.')")
+        self.assertNotEqual(self.page.run("document.querySelector('#course-task').className"), "done", "two scenes, and one that was refused")
         self.page.click("#scene-S27")
         self.done("three scenes")
         self.wait(lambda: self.values("/arm_sim/set_params")["gravity"] == 981, "strong gravity")
@@ -173,6 +179,50 @@ class Tasks(CourseTest):
         self.page.run("location.hash = '#step=6'")
         self.page.until("document.querySelector('#course-title').checkVisibility() && !document.querySelector('#offer').checkVisibility()")
         self.assertEqual(self.page.text("#course-number"), "Step 6 of 10")
+
+    def press(self, selector):
+        self.page.run(f"document.querySelector('{selector}').focus()")
+        self.page.key("Enter")
+
+    def test_a_keyboard_does_a_step_and_keeps_its_place(self):
+        self.press("#course-start")
+        self.page.until("!document.querySelector('#course-dial').inert && own('arm_view.js').then(({ endEffector }) => endEffector().x > 1.99)", why="the scene")
+        self.page.run("document.querySelector('#arm').focus()")
+        for _ in range(4):
+            self.page.key("ArrowLeft")
+        self.done("the tip has arrived")
+        self.wait(lambda: self.runtime.end_effector()[0] < 1.9, "the arm has followed")
+        self.press("#course-question button")
+        self.page.until("document.activeElement.matches('#course-question .right')", why="an answer keeps the focus")
+        self.press("#course-next")
+        self.page.until("document.activeElement.id === 'course-title' && document.querySelector('#course-question button') && !document.querySelector('#course-dial').inert")
+        self.press("#course-question button")
+        self.page.until("document.activeElement.closest('#course-dial') !== null", why="after the guess the dial is next")
+
+    def test_paper_shows_the_pictures_and_of_a_sheet_the_course_only(self):
+        self.page.run("""addEventListener('afterprint', () => { window.paper = [...document.querySelectorAll('#arm, #course-chart')]
+            .map((one) => Math.max(...one.getContext('2d').getImageData(1, 1, 1, 1).data.slice(0, 3))); })""")
+        self.step(3)
+        self.page.send("Page.printToPDF")
+        self.assertGreater(min(self.page.until("window.paper")), 200, "no black picture")
+        self.step(10)
+        self.press("#own-form button")
+        self.done("a sheet")
+        self.page.until("document.activeElement.closest('#own-form') !== null", why="a busy button keeps the focus")
+        self.page.send("Emulation.setEmulatedMedia", {"media": "print"})
+        self.assertFalse(self.page.run("document.querySelector('#arm').checkVisibility()"))
+        self.assertTrue(self.page.run("document.querySelector('#view-switch').click(), document.querySelector('#arm').checkVisibility()"))
+
+    def test_forced_colors_leave_the_pictures_theirs(self):
+        self.page.send("Emulation.setEmulatedMedia", {"features": [{"name": "forced-colors", "value": "active"}]})
+        self.assertNotEqual(self.color("joint1"), self.color("joint2"))
+        self.wait(lambda: self.image("#arm").count(self.color("joint1")) > 200, "the first link")
+
+    def test_on_its_side_a_phone_shows_the_arm_beside_all_of_the_text(self):
+        page = self.open("#step=6", width=844, height=390, touch=True)
+        for place in (0, 300):
+            top, bottom = page.run(f"(scrollTo(0, {place}), new Promise(requestAnimationFrame)).then(() => {{ const b = document.querySelector('#arm').getBoundingClientRect(); return [b.top, b.bottom]; }})")
+            self.assertTrue(0 <= top and bottom <= 390, f"from {top} to {bottom} after {place}")
 
     def test_both_views_show_the_same_arm_and_a_link_names_the_step(self):
         self.step(6)

@@ -33,9 +33,10 @@ class Ways(PageTest):
         self.assertTrue(self.page.run("document.querySelector('#undo').disabled"))
         self.page.fill(f"#timestep-field {NUMBER}", "2")
         self.page.until("!document.querySelector('#undo').disabled")
-        self.page.click("#undo")
+        self.page.run("document.querySelector('#undo').focus()")
+        self.page.key("Enter")
         self.wait(lambda: self.values("/arm_sim/set_integrator")["timestep"] == 0.001, "undone")
-        self.page.until("document.querySelector('#undo').disabled")
+        self.page.until("document.querySelector('#undo').disabled && document.activeElement.id === 'arm'", why="the focus is not lost")
 
     def test_one_cursor_is_on_all_plots(self):
         self.page.until("own('history.js').then(({ record }) => record.length > 120)")

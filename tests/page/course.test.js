@@ -4,14 +4,15 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
-import { STEPS, nothingSeen, ofLimit, shrinks, stepIn } from "../../page/course.js";
+import { STEPS, followEnergy, nothingSeen, ofLimit, shrinks, stepIn } from "../../page/course.js";
 import { SCENES, settingsOf } from "../../page/scenes.js";
 
 const words = (text) => text.split(/\s+/).length;
 
-test("ten steps, each with at most 40 words and sentences of at most 25", () => {
+test("ten steps, each with scenes, at most 40 words, and sentences of at most 25", () => {
   assert.equal(STEPS.length, 10);
-  for (const { id, text } of STEPS) {
+  for (const { id, text, scene } of STEPS) {
+    for (const links of [2, 3]) assert.equal(scene(links).gains.kp.length, links, id);
     assert.ok(words(text) <= 40, `${id}: ${words(text)} words`);
     for (const sentence of text.split(/[.?!](?=\s|$)/)) assert.ok(words(sentence) <= 25, `${id}: ${sentence}`);
   }
@@ -22,26 +23,27 @@ test("every question has one right answer, with the reason", () => {
     for (const one of guess ? [question, guess] : [question]) {
       assert.ok(one.right >= 0 && one.right < one.answers.length && one.because.length > 20, id);
       assert.equal(new Set(one.answers).size, one.answers.length, id);
+      assert.doesNotMatch(one.text, /every \d/, `${id}: three links have other periods`);
     }
   }
 });
 
 test("no task is done before anything is done, and each can be", () => {
-  const all = { methods: new Set(["euler", "midpoint", "verlet", "rk4"]), reached: true, shook: true, shrinks: true, gain: 100, stable: true, measured: true, scenes: 3, sheet: true };
+  const all = { methods: new Set(["euler", "midpoint", "verlet", "rk4"]), reached: true, shook: true, shrinks: true, gain: 100, stable: true, measured: true, scenes: new Set("123"), energy: { since: 1, until: 4, low: 7, high: 7.5 }, sheet: true };
   for (const { id, task } of STEPS) {
     assert.equal(task.done(nothingSeen()), false, id);
     assert.equal(task.done(all), true, id);
   }
 });
 
-test("every method but Euler keeps the energy", () => {
+test("energy is kept if it varies little for three seconds", () => {
   const { done } = STEPS.find(({ id }) => id === "energy").task;
-  const kept = ["euler", "midpoint", "verlet", "rk4"].map((method) => done({ ...nothingSeen(), methods: new Set(["euler", method]) }));
-  assert.deepEqual(kept, [false, true, true, true]);
-});
-
-test("every step has a scene for two and for three links", () => {
-  for (const { id, scene } of STEPS) for (const links of [2, 3]) assert.equal(scene(links).gains.kp.length, links, id);
+  const keeps = (growth, seconds) => {
+    let { energy } = nothingSeen();
+    for (let time = 1; time <= 1 + seconds; time += 0.125) energy = followEnergy(energy, "rk4", time, 7 + growth * time);
+    return done({ ...nothingSeen(), energy });
+  };
+  assert.deepEqual([keeps(0, 2), keeps(0, 3), keeps(0.1, 4), keeps(0.6, 9)], [false, true, true, false]);
 });
 
 test("bars that flip and grow differ from bars that decay", () => {

@@ -37,26 +37,14 @@ test("a run that diverged has its time, but no energy and no error", () => {
   assert.deepEqual([line.energy, line.error], ["–", "–"]);
   assert.equal(away[7], null);
   assert.notEqual(away[6], null);
-});
-
-test("the last sample may lie a step before the end", () => {
+  // The last sample may lie a step before the end.
   assert.equal(endOf([0, 0.9], 1, 0.1), null);
   assert.equal(endOf([0, 0.8], 1, 0.1), 0.8);
 });
 
-test("a rung without an error differs from one that diverged", () => {
-  const rung = { method: "rk4", timestep: 0.01 };
-  const whole = read(rung, { times: [0, 2], error: null, wall_time: 1, evaluations: 8 }, 2);
-  assert.deepEqual([whole.error, whole.divergedAt], [null, null]);
-  assert.equal(read(rung, { times: [0, 0.5], error: null, wall_time: 1, evaluations: 8 }, 2).divergedAt, 0.5);
-});
-
-test("all methods climb the same ladder, the longest timesteps first", () => {
+test("all methods climb the same ladder, and the cheapest run that is good enough is found for each", () => {
   assert.equal(rungs().length, 4 * TIMESTEPS.length);
   assert.equal(rungs()[0].timestep, Math.max(...TIMESTEPS));
-});
-
-test("the cheapest run that is good enough is found for each method", () => {
   const rung = (method, error, wall) => ({ method, timestep: 1, error, wall, evaluations: 1, divergedAt: null });
   const best = cheapest([rung("euler", 1e-4, 9), rung("euler", 1e-3, 5), rung("rk4", 1e-2, 1), rung("rk4", 1e-6, 2), rung("verlet", null, 1)], 1e-3);
   assert.deepEqual(best.map(({ method, wall }) => [method, wall]), [["euler", 5], ["rk4", 2]]);

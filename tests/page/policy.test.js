@@ -111,9 +111,7 @@ test("the limit of the control period is the answer's own, or the timestep's whe
   assert.equal(controlPeriodLimit(arm({ stability: { ...VALUES, control_period_limit: 0.012 } })), 0.012);
   assert.equal(controlPeriodLimit(arm({ stability: { ...VALUES, control_period_limit: null } })), Infinity);
   assert.ok(Number.isNaN(controlPeriodLimit(arm({ enabled: false }))));
-});
-
-test("with a delay the limit is not known unless the answer names it", () => {
+  // With a delay it is not known unless the answer names it.
   const delayed = { period: { period: 0, effective_period: 0.001, delay: true } };
   assert.equal(verdict(arm(delayed)).kind, "unknown");
   assert.equal(verdict(arm({ ...delayed, stability: { ...VALUES, control_period_limit: 0.0008 } })).kind, "beyond");
@@ -128,9 +126,8 @@ test("the control period is given in steps and in time", () => {
 });
 
 test("energy drifts only if nothing puts any in", () => {
-  assert.equal(energyName({ enabled: false, pushed: false }), "drift");
-  assert.equal(energyName({ enabled: true, pushed: false }), "work");
-  assert.equal(energyName({ enabled: false, pushed: true }), "pushed in");
+  const name = (enabled, pushed) => energyName({ enabled, pushed });
+  assert.deepEqual([name(false, false), name(true, false), name(false, true)], ["drift", "work", "pushed in"]);
 });
 
 const FREE = {
@@ -169,9 +166,7 @@ test("the motion's first limit is kept, and none of an arm that has diverged", (
 test("a button's limit counts the motion, whatever the method", () => {
   const state = swing("verlet", 0.001, { answers: { verlet: FREE, rk4: { ...FREE, timestep_limit_held: 0.393, timestep_limit: 0.393, timestep_limit_motion: 0.0762 } } });
   assert.deepEqual(["verlet", "rk4", "euler"].map((method) => limitInForce(state, method).limit), [0.0488, 0.0762, NaN]);
-});
-
-test("Midpoint's free swing gains energy so slowly that the motion is the limit, Euler's does not", () => {
+  // Midpoint's free swing gains energy so slowly that the motion is the limit. Euler's does not.
   const grows = { ...FREE, timestep_limit_held: 0, timestep_limit: 0 };
   assert.equal(limitInForce(swing("midpoint", 0.001, { stability: grows })).limit, 0.0488);
   assert.equal(limitInForce(swing("euler", 0.001, { stability: grows })).limit, 0);

@@ -3,31 +3,22 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { duration, exact, fixed, plain, short, significant } from "../../page/format.js";
+import { duration, fixed, inPageNames, plain, short, significant } from "../../page/format.js";
+import { Rosbridge } from "../../page/rosbridge.js";
 import { Axis, symmetricLog } from "../../page/scale.js";
 import { DEFAULTS, Undo, fromFragment, presentSettings, toFragment } from "../../page/settings.js";
 
-test("a field shows four digits, and its exponent whole", () => {
+test("a field shows four digits and its exponent whole, a caption few digits", () => {
   assert.equal(plain(3.00591098005247), "3.006");
   assert.equal(plain(-3.75616e73), "-3.756e+73");
   assert.equal(plain(1234567), "1235000");
   assert.equal(plain(NaN), "");
-});
-
-test("a figure in a caption keeps its digits few", () => {
   assert.deepEqual([short(-0.0421, 3), short(2271.893, 3), short(-7450.32, 2), short(123456.7, 2), short(1e9, 3), short(0, 3), short(NaN, 3)],
     ["−0.042", "2271.9", "−7450.3", "123457", "1e9", "0.000", "–"]);
 });
 
-test("a link keeps all digits", () => {
-  assert.equal(Number(exact(0.1 + 0.2)), 0.1 + 0.2);
-});
-
-test("a number that is not finite is a dash", () => {
+test("durations have the unit that suits them, and a number that is not finite is a dash", () => {
   for (const text of [fixed(NaN, 2), significant(Infinity, 3), duration(-Infinity)]) assert.equal(text, "–");
-});
-
-test("durations have the unit that suits them", () => {
   assert.deepEqual([duration(0.00345), duration(2.5e-5), duration(1), duration(0)], ["3.45 ms", "25 µs", "1 s", "0 s"]);
 });
 
@@ -61,27 +52,21 @@ test("the symmetric logarithm is odd and near zero the identity over ln 10", () 
   assert.ok(Math.abs(symmetricLog(1e-6) - 1e-6 / Math.LN10) < 1e-12);
 });
 
-test("settings survive a link", () => {
+test("settings survive a link, once all have arrived", () => {
   for (const links of [2, 3]) {
     const params = { gravity: 2.5, masses: [1, 2, 3].slice(0, links), lengths: [0.7, 1.1, 0.9].slice(0, links) };
     const settings = { ...DEFAULTS[links], params, period: { period: 0.0021, delay: true }, setpoint: [0.1 + 0.2, -1e-9, 3].slice(0, links), controller: true };
     assert.deepEqual(fromFragment(`#${toFragment(settings, links)}`), settings);
   }
+  assert.equal(presentSettings({ links: 2, integrator: null }), null);
 });
 
-test("a link may have fewer settings, and unknown names are ignored", () => {
+test("a link may have fewer settings, the arm's start, and unknown names, which are ignored", () => {
   const settings = fromFragment("#kp=1,2&method=leapfrog&__proto__=1");
   assert.deepEqual(settings.gains, { kp: [1, 2] });
   assert.equal(settings.integrator, null);
-});
-
-test("a link may have the arm's start", () => {
   assert.deepEqual(fromFragment("#position=0.3,-1e-6&velocity=2,0").start, { position: [0.3, -1e-6], velocity: [2, 0] });
   assert.equal(fromFragment("#kp=1,2").start, undefined);
-});
-
-test("settings are present once all have arrived", () => {
-  assert.equal(presentSettings({ links: 2, integrator: null }), null);
 });
 
 test("a slider that is dragged is one change to undo", () => {
@@ -105,4 +90,14 @@ test("a refused change cannot be undone", () => {
   undo.remember(DEFAULTS[2], 6000);
   assert.ok(!undo.leadsBackFrom(DEFAULTS[2]));
   assert.equal(undo.take(DEFAULTS[2]), undefined);
+});
+
+test("a refusal keeps the runtime's names until it is shown", async () => {
+  globalThis.WebSocket ??= { OPEN: 1 };
+  const socket = { readyState: 1, send() {} };
+  const refused = new Rosbridge(() => socket, () => {}).call("/set");
+  const status = "gains.kp[0] must be a number, got null";
+  socket.onmessage({ data: JSON.stringify({ op: "service_response", id: "page-1", status }) });
+  assert.equal((await refused).status, status);
+  assert.equal(inPageNames(status), "kp 1 must be a number");
 });
