@@ -66,6 +66,9 @@ pub enum Refused {
         /// How many of their places are kept.
         kept: usize,
     },
+    /// It has not sent the required token, and too many such clients wait.
+    #[error("this runtime requires its token first, and too many connections wait without a token")]
+    NoToken,
     /// The runtime is ending.
     #[error("shutting down")]
     Closed,
