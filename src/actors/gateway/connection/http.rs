@@ -87,7 +87,7 @@ impl ClientSession {
         let (stream, behind) = serve::serve(stream, first, due, site, &gate, cut_off).await?;
         let place = place?;
         let quiet = Request {
-            from: place.id(),
+            from: place.id,
             incoming: Incoming {
                 id: None,
                 op: Ok(Op::SetLevel {

@@ -370,7 +370,7 @@ impl ClientReader {
             _ => {}
         }
         let request = Request {
-            from: self.place.id(),
+            from: self.place.id,
             incoming,
             permit: self.held.permit.clone(),
         };
@@ -383,7 +383,7 @@ impl ClientReader {
 
     /// Withdraws the client's registrations, because it can no longer answer calls.
     fn retire<S: ClientStream>(&self, client: &Connection<S>) -> ReadStep {
-        let retired = client.registry.send(Retire(self.place.id()));
+        let retired = client.registry.send(Retire(self.place.id));
         let gone = timeout(RESPONSES_TIME, closed(client.ends));
         ReadStep::Retiring(Some(Box::pin(effect(retired))), Box::pin(gone))
     }
@@ -393,7 +393,7 @@ impl ClientReader {
         client.abandon_computations();
         self.held = HeldInput::default();
         // Answers already sent arrive before the registry's reply.
-        let left = client.registry.send(Disconnect(self.place.id()));
+        let left = client.registry.send(Disconnect(self.place.id));
         ReadStep::Leaving(Box::pin(left))
     }
 }

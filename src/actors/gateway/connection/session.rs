@@ -55,14 +55,8 @@ pub(super) struct Opened<S> {
 
 /// The place of a registered client. Dropping it frees the place.
 pub(super) struct HeldPlace {
-    id: ConnectionId,
+    pub(super) id: ConnectionId,
     registry: Addr<Registry>,
-}
-
-impl HeldPlace {
-    pub(super) const fn id(&self) -> ConnectionId {
-        self.id
-    }
 }
 
 impl Drop for HeldPlace {

@@ -57,20 +57,6 @@ pub(super) struct Subscriber {
 }
 
 impl Subscriber {
-    pub(super) fn new(
-        connection: ConnectionId,
-        spelling: Arc<str>,
-        mailbox: Recipient<ToClient>,
-    ) -> Self {
-        Self {
-            connection,
-            spelling,
-            mailbox,
-            encoding: Encoding::default(),
-            subscriptions: Vec::new(),
-        }
-    }
-
     /// The subscription with this `id`.
     pub(super) fn subscription(&self, id: Option<&str>) -> Option<&Subscription> {
         let mut all = self.subscriptions.iter();
@@ -116,9 +102,21 @@ impl Topics {
     }
 
     /// A client has begun to subscribe to a topic under a spelling.
-    pub(super) fn add_subscriber(&mut self, topic: &str, subscriber: Subscriber) {
+    pub(super) fn add_subscriber(
+        &mut self,
+        topic: &str,
+        spelling: Arc<str>,
+        connection: ConnectionId,
+        mailbox: Recipient<ToClient>,
+    ) {
         let users = self.by_name.entry(topic.into()).or_default();
-        users.subscribers.push(subscriber);
+        users.subscribers.push(Subscriber {
+            connection,
+            spelling,
+            mailbox,
+            encoding: Encoding::default(),
+            subscriptions: Vec::new(),
+        });
     }
 
     /// A client that uses a topic has named its type. Returns whether it is the topic's first type.

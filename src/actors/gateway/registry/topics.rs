@@ -136,8 +136,8 @@ impl Registry {
             let spelling: Arc<str> = topic.into();
             client.registered.subscribed.insert(Arc::clone(&spelling));
             let mailbox = client.outlets.mailbox.clone();
-            let new = Subscriber::new(origin.from, spelling, mailbox);
-            self.topics.add_subscriber(&absolute, new);
+            let topics = &mut self.topics;
+            topics.add_subscriber(&absolute, spelling, origin.from, mailbox);
         }
         if let Some(type_name) = subscribe.type_name.as_deref() {
             self.topics.note_type(&absolute, type_name);
