@@ -128,7 +128,7 @@ impl Stage {
         for topic in Topic::ALL {
             if topic.direction() == Direction::Subscribed {
                 let route = || -> Route<TopicMessage> { Box::new(|_| ()) };
-                nodes.listeners.entry(topic).or_insert_with(route);
+                nodes.subscribers.entry(topic).or_insert_with(route);
             } else {
                 let publisher = nodes.publishers.entry(topic);
                 publisher.or_insert_with(|| node.clone().recipient());

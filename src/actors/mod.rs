@@ -9,8 +9,8 @@
 //! ```
 //!
 //! The listener is a task for each socket. There is a connection for each client, and one of every other actor. The
-//! nodes are `arm_sim` on its own thread, `ik_action`, `ik_trial`, `follow`, `rosapi`, `rosout`, `tf_web` and
-//! `recorder`. The pool of workers does the work of `study`.
+//! nodes are `arm_sim` on its own thread, `ik_action`, `ik_trial`, `joint_trajectory_controller` (`follow`), `study`,
+//! `rosapi`, `rosout`, `tf2_web_republisher` (`tf_web`) and `recorder`. `study` computes on a pool of workers.
 //!
 //! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, through the question's reader, or
 //! from another node. The [`node::Reply`] is the way back.

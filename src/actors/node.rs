@@ -314,13 +314,13 @@ pub struct Nodes {
     /// Passes a goal to the node that serves its action.
     pub actions: HashMap<Action, Route<ActionRequest>>,
     /// Passes a message to the node that subscribes to its topic.
-    pub listeners: HashMap<Topic, Route<TopicMessage>>,
+    pub subscribers: HashMap<Topic, Route<TopicMessage>>,
     /// The node that publishes each of the runtime's topics.
     pub publishers: HashMap<Topic, Recipient<Interest>>,
 }
 
 impl Nodes {
-    /// A row of a node's table: calls of `service` are this question. Its fields are read here, and the rejected ones
+    /// The node serves `service`: it gets each call as this question. The arguments are read here, and rejected ones
     /// are reported.
     pub fn serve<A: Answered>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
         let node = node.into();
@@ -347,8 +347,8 @@ impl Nodes {
         self.services.insert(service, Box::new(take));
     }
 
-    /// Messages of clients on `topic` are read by `read`, and are for this node as `to_node` makes them.
-    pub fn listen<T: 'static, E: Display + 'static, M: Message<Result = ()> + Send + 'static>(
+    /// The node subscribes to `topic`: `read` reads a client's message, and `to_node` makes the node's own message of it.
+    pub fn subscribe<T: 'static, E: Display + 'static, M: Message<Result = ()> + Send + 'static>(
         &mut self,
         topic: Topic,
         node: impl Into<Recipient<M>>,
@@ -364,11 +364,11 @@ impl Nodes {
                 Err(why) => message.refuse(topic, &why),
             });
         };
-        self.listeners.insert(topic, Box::new(take));
+        self.subscribers.insert(topic, Box::new(take));
     }
 
-    /// Goals of this kind, and their cancellations, are for this node.
-    pub fn carry_out<G: Goal, A>(&mut self, node: Addr<A>)
+    /// The node serves the action of these goals: it gets goals and cancellations.
+    pub fn serve_action<G: Goal, A>(&mut self, node: Addr<A>)
     where
         A: Actor<Context = Context<A>> + Handler<ForwardGoal<G>> + Handler<CancelSent>,
     {

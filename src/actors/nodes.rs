@@ -9,7 +9,7 @@ use actix::prelude::*;
 use super::arm::follow::PathFollower;
 use super::arm::ik_action::{GoalTracker, IkAction};
 use super::arm::ik_trial::{GoalClient, IkTrial};
-use super::arm::sim::{ArmPose, ArmSim, Connect};
+use super::arm::sim::{ArmPose, ArmSim, AttachNodes};
 use super::compute::study::Study;
 use super::compute::workers::WorkerPool;
 use super::gateway::registry::Registry;
@@ -72,9 +72,9 @@ pub fn start_nodes<const N: usize>(
     PathFollower::attach(&follower, nodes);
     let (pose, tracker) = (arm.clone().recipient(), GoalTracker::of(arm));
     let (action, _) = start_goal_nodes(pose, tracker, registry, seed, nodes);
-    arm.do_send(Connect {
+    arm.do_send(AttachNodes {
         study: Some(study.recipient()),
-        owners: vec![
+        goal_reporters: vec![
             registry.clone().recipient(),
             action.clone().recipient(),
             follower.clone().recipient(),

@@ -20,8 +20,8 @@ use tokio::time::{Instant, sleep, timeout_at};
 use crate::actors::arm::sim::ArmSim;
 use crate::actors::compute::workers::WorkerPool;
 use crate::actors::gateway::connection::admission::{Admission, Slots};
-use crate::actors::gateway::files;
 use crate::actors::gateway::listener;
+use crate::actors::gateway::open_files;
 use crate::actors::gateway::registry::{Attach, FinishAll, RefuseCalls, Registry};
 use crate::actors::node::{Nodes, ShutDown};
 use crate::actors::nodes;
@@ -113,7 +113,7 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
         .and_then(|socket| socket.local_addr().ok())
         .unwrap_or(options.bind);
 
-    let room = files::make_room(options.clients, options.token.is_some());
+    let room = open_files::make_room(options.clients, options.token.is_some());
     let gauges = Arc::<Gauges>::default();
     let registry = Registry::new(Arc::clone(&gauges))
         .serving_at_most(room.clients)
@@ -195,7 +195,7 @@ impl NodeEnds {
     /// Starts the requested record, and the recorder for clients' records.
     async fn record(&self, options: &Options) -> Result<(), RunError> {
         let folder = options.record_dir.as_deref();
-        folder.map(recorder::look_into).transpose()?;
+        folder.map(recorder::check_folder).transpose()?;
         if options.record.is_some()
             // The recorder lives as long as the registry.
             && let Ok(begun) = self.record.send(RecordTo(options.record.clone())).await

@@ -16,8 +16,8 @@ use crate::stage::stand_in;
 use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
-    ArmPose, ArmSettings, ArmSim, CommandGoal, Connect, GoalOrder, GoalProgress, MAX_STEPS, Pause,
-    Reset, STEPS_IN_A_ROW, SetParams, Step, TURN_MESSAGES, TakeSnapshot, TrackGoal,
+    ArmPose, ArmSettings, ArmSim, AttachNodes, CommandGoal, GoalOrder, GoalProgress, MAX_STEPS,
+    Pause, Reset, STEPS_IN_A_ROW, SetParams, Step, TURN_MESSAGES, TakeSnapshot, TrackGoal,
 };
 use pendularm::actors::node::{
     Ask, Asker, Barrier, Call, Done, Interest, Publish, Reply, ShutDown, Unserved,
@@ -218,8 +218,15 @@ fn progress_of_a_goal_is_sent_step_by_step_however_many_clients_step_the_arm() {
         let before: Rc<RefCell<Vec<usize>>> = Rc::default();
         let (log, barriers) = (Rc::clone(&received), Rc::clone(&before));
         let publisher = stand_in(move |_: Barrier| barriers.borrow_mut().push(log.borrow().len()));
-        let (study, owners) = (None, vec![publisher]);
-        bench.arm.send(Connect { study, owners }).await.unwrap();
+        let (study, goal_reporters) = (None, vec![publisher]);
+        bench
+            .arm
+            .send(AttachNodes {
+                study,
+                goal_reporters,
+            })
+            .await
+            .unwrap();
         bench.ask(of_timestep(1.0));
         bench.ask(SetParams {
             gravity: Some(0.0),

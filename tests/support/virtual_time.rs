@@ -278,7 +278,7 @@ impl Node {
         for topic in topics {
             let node = address.clone();
             let route = Box::new(move |message| node.do_send(Sent(message)));
-            nodes.listeners.insert(*topic, route);
+            nodes.subscribers.insert(*topic, route);
             nodes.publishers.insert(*topic, address.clone().recipient());
         }
     }

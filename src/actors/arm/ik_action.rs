@@ -94,7 +94,7 @@ impl<const N: usize> IkAction<N> {
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<GoalRequest<N>>(Service::SendGoal, address.clone());
         nodes.serve::<CancelRequest>(Service::CancelGoal, address.clone());
-        nodes.carry_out::<GoalRequest<N>, _>(address.clone());
+        nodes.serve_action::<GoalRequest<N>, _>(address.clone());
     }
 }
 

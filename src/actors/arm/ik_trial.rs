@@ -117,7 +117,7 @@ impl<const N: usize> Handler<GoalReport<N>> for IkTrial<N> {
 
     fn handle(&mut self, news: GoalReport<N>, ctx: &mut Context<Self>) {
         let GoalReport { goal, progress } = news;
-        let mut commands = self.hear(&progress.pose);
+        let mut commands = self.note_pose(&progress.pose);
         let distance = progress.distance;
         match progress.outcome {
             None => self.trial.feedback(&goal.id, distance, &goal.positions),
@@ -169,7 +169,7 @@ impl<const N: usize> IkTrial<N> {
             }
             return;
         };
-        let mut commands = self.hear(&pose);
+        let mut commands = self.note_pose(&pose);
         let target = || sample(&self.lengths, || self.rng.f64());
         let (decided, reply) = match intent {
             Intent::Perform(ask, reply) => {
@@ -209,11 +209,11 @@ impl<const N: usize> IkTrial<N> {
     }
 
     /// Stores lengths and time. Two requests may be answered in either order, so the later time counts.
-    fn hear(&mut self, pose: &Pose<N>) -> Vec<TrialCommand> {
+    fn note_pose(&mut self, pose: &Pose<N>) -> Vec<TrialCommand> {
         self.lengths = pose.lengths;
-        let heard = (pose.resets, pose.simulated);
-        if heard > self.clock {
-            self.clock = heard;
+        let latest = (pose.resets, pose.simulated);
+        if latest > self.clock {
+            self.clock = latest;
         }
         self.trial.tick(self.clock.1)
     }

@@ -3,7 +3,7 @@
 //! **Invariant:** the runtime's own names come from the catalog. No client's input stops the service of others.
 
 pub mod connection;
-pub mod files;
 pub mod limits;
 pub mod listener;
+pub mod open_files;
 pub mod registry;

@@ -221,7 +221,7 @@ impl<const N: usize> Recorder<N> {
 ///
 /// # Errors
 /// The system's error, if it is not a folder.
-pub fn look_into(folder: &Path) -> Result<(), NotRecorded> {
+pub fn check_folder(folder: &Path) -> Result<(), NotRecorded> {
     fs::read_dir(folder)
         .map(drop)
         .map_err(|why| NotRecorded::File {

@@ -39,7 +39,7 @@ impl RosapiNode {
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         for question in Rosapi::ALL {
             if question != Rosapi::GetTime && !question.is_about_parameters() {
-                nodes.serve::<Look>(Service::Rosapi(question), address.clone());
+                nodes.serve::<AskRosapi>(Service::Rosapi(question), address.clone());
             }
         }
     }
@@ -49,14 +49,14 @@ impl RosapiNode {
 
 /// A question about what there is: topics, services, nodes and types.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Look {
+pub struct AskRosapi {
     /// The question.
     pub question: Rosapi,
     /// The name that it is about, if it is about one.
     pub name: String,
 }
 
-impl Ask for Look {
+impl Ask for AskRosapi {
     type Answer = Result<Value, UnknownType>;
 }
 
@@ -68,10 +68,10 @@ impl Actor for RosapiNode {
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
-impl Handler<Call<Look>> for RosapiNode {
+impl Handler<Call<AskRosapi>> for RosapiNode {
     type Result = ();
 
-    fn handle(&mut self, call: Call<Look>, ctx: &mut Context<Self>) {
+    fn handle(&mut self, call: Call<AskRosapi>, ctx: &mut Context<Self>) {
         let Call { ask, mut reply } = call;
         let registry = self.registry.clone();
         let answered = async move {
@@ -92,7 +92,7 @@ impl Handler<Call<Look>> for RosapiNode {
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
 
-impl Callable for Look {
+impl Callable for AskRosapi {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let name = service.fields().first();
@@ -109,7 +109,7 @@ impl Callable for Look {
     }
 }
 
-impl Answered for Look {
+impl Answered for AskRosapi {
     fn write(answer: Result<Value, UnknownType>, to: &Address) -> Bytes {
         to.outcome(answer)
     }

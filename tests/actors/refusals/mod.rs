@@ -2,7 +2,7 @@
 //!
 //! `rows.txt` has the table for 2 links. A row is a service, a field, a literal for it, and the status that the client gets.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::nodes::{start_whole, work_in_this_thread};
 use crate::system::in_virtual_time;
@@ -164,7 +164,7 @@ fn every_field_of_every_service_has_a_row() {
             let has_row = rows
                 .iter()
                 .any(|row| row[0] == service.name() && row[1] == field);
-            assert!(has_row, "{} {field}", service.name());
+            assert!(has_row, "{} {field} has no row in rows.txt", service.name());
         }
     }
 }
@@ -207,6 +207,31 @@ fn every_service_refuses_other_arguments_and_names_a_required_field_that_is_abse
                 assert_eq!(answer["status"], statuses.join("; "), "{service:?}");
                 assert_eq!(answer["values"], json!({}), "{service:?}");
             }
+        }
+    });
+}
+
+/// `tests/actors/exchanges/mod.rs` has rosapi, and `tests/wire/record.rs` the recorder.
+#[test]
+fn every_answer_has_the_fields_of_its_row_in_the_catalogue() {
+    in_virtual_time(async {
+        let (_gateway, mut client) = start::<2>().await;
+        for service in Service::ALL {
+            let name = service.name();
+            if matches!(service, Service::Rosapi(_)) || name.starts_with("/recorder") {
+                continue;
+            }
+            let takes_duration = service
+                .fields()
+                .iter()
+                .any(|field| field.name == "duration");
+            let short = takes_duration.then_some(("duration", "0.1"));
+            let answer = call(&mut client, name, &request(name, short.as_slice())).await;
+            assert_eq!(answer["result"], true, "{answer}");
+            let written = answer["values"].as_object().unwrap().keys();
+            let written: BTreeSet<&str> = written.map(String::as_str).collect();
+            let listed = service.response_fields().iter().map(|field| field.name);
+            assert_eq!(written, listed.collect(), "{name}: written and listed");
         }
     });
 }

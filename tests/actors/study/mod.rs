@@ -19,7 +19,7 @@ use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
-    ArmSettings, Connect, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetParams,
+    ArmSettings, AttachNodes, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetParams,
 };
 use pendularm::actors::compute::study::{IntegrationStep, PredictStability, RunOffline, Study};
 use pendularm::actors::compute::workers::WorkerPool;

@@ -74,7 +74,7 @@ impl<const N: usize> PathFollower<N> {
 
     /// Adds this node's action to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        nodes.carry_out::<FollowPath<N>, _>(address.clone());
+        nodes.serve_action::<FollowPath<N>, _>(address.clone());
     }
 }
 
@@ -133,7 +133,7 @@ impl<const N: usize> Handler<Barrier> for PathFollower<N> {
         if self.active.is_none() {
             return AtomicResponse::new(Box::pin(std::future::ready(()).into_actor(self)));
         }
-        AtomicResponse::new(Box::pin(self.go_on()))
+        AtomicResponse::new(Box::pin(self.check_arm()))
     }
 }
 
@@ -192,25 +192,26 @@ impl<const N: usize> PathFollower<N> {
             setpoint: pose.setpoint,
             feedback: Cadence::default(),
         });
-        self.lead(pose, Some(done), ctx);
+        self.move_setpoint(pose, Some(done), ctx);
     }
 
-    /// Checks the arm, and moves its setpoint.
-    fn look(&mut self, ctx: &mut Context<Self>) {
+    /// The next move of the setpoint is due.
+    fn move_on_timer(&mut self, ctx: &mut Context<Self>) {
         self.timer = None;
-        ctx.wait(self.go_on());
+        ctx.wait(self.check_arm());
     }
 
-    /// The same for a caller that waits for it.
-    fn go_on(&self) -> impl ActorFuture<Self, Output = ()> + use<N> {
+    /// Asks for the arm's pose, then moves its setpoint or ends the goal.
+    fn check_arm(&self) -> impl ActorFuture<Self, Output = ()> + use<N> {
         let pose = self.arm.send(ArmPose).into_actor(self);
         pose.map(|pose, node, ctx| match pose {
-            Ok(pose) => node.lead(&pose, None, ctx),
+            Ok(pose) => node.move_setpoint(&pose, None, ctx),
             Err(_) => node.abort(Unserved::NO_ARM.0),
         })
     }
 
-    fn lead(&mut self, pose: &Pose<N>, done: Option<Done>, ctx: &mut Context<Self>) {
+    /// Moves the setpoint to its place on the path at this pose of the arm. Ends a goal that the arm cannot follow.
+    fn move_setpoint(&mut self, pose: &Pose<N>, done: Option<Done>, ctx: &mut Context<Self>) {
         let Some(goal) = &mut self.active else {
             return;
         };
@@ -239,22 +240,22 @@ impl<const N: usize> PathFollower<N> {
         let moved = self.setpoint.send(moved).into_actor(self);
         ctx.wait(moved.map(move |moved, node, ctx| {
             match moved {
-                Ok(Ok(())) => node.go_along(standing, ctx),
-                Ok(Err(resets)) => node.give_way(resets),
+                Ok(Ok(())) => node.continue_or_end(standing, ctx),
+                Ok(Err(resets)) => node.end_replaced(resets),
                 Err(_) => node.abort(Unserved::NO_ARM.0),
             }
             drop(done);
         }));
     }
 
-    /// The setpoint has been moved: sets the timer for the next move, or ends the goal.
-    fn go_along(&mut self, standing: Standing, ctx: &mut Context<Self>) {
+    /// After a move of the setpoint: sets the timer for the next move, or ends the goal.
+    fn continue_or_end(&mut self, standing: Standing, ctx: &mut Context<Self>) {
         let (status, code, why) = match standing {
             Standing::Moving => {
                 if let Some(before) = self.timer.take() {
                     ctx.cancel_future(before);
                 }
-                self.timer = Some(ctx.run_later(PERIOD, Self::look));
+                self.timer = Some(ctx.run_later(PERIOD, Self::move_on_timer));
                 return;
             }
             Standing::Arrived => (GoalStatus::Succeeded, ResultCode::Successful, String::new()),
@@ -273,7 +274,7 @@ impl<const N: usize> PathFollower<N> {
     }
 
     /// Ends the goal: another setpoint or a reset, the last of `resets`, has replaced its own.
-    fn give_way(&mut self, resets: u64) {
+    fn end_replaced(&mut self, resets: u64) {
         let goal = self.active.as_ref();
         let is_reset = goal.is_some_and(|goal| goal.resets != resets);
         self.abort(if is_reset {

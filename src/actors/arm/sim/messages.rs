@@ -39,12 +39,12 @@ pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
 /// The nodes around the arm. From the runtime, once.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub struct Connect<const N: usize> {
+pub struct AttachNodes<const N: usize> {
     /// The node that computes [`HeldLimit`]. Without it an arm has no limits.
     pub study: Option<Recipient<HeldLimit<N>>>,
     /// The actors that inform clients of goals: the registry, `ik_action` and `joint_trajectory_controller`. The arm
     /// sends them a [`Barrier`] before it reports that it is at rest, and between steps on request.
-    pub owners: Vec<Recipient<Barrier>>,
+    pub goal_reporters: Vec<Recipient<Barrier>>,
 }
 
 /// Sets the listener of the journal, or none. From the recorder.

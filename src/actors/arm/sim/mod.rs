@@ -13,8 +13,8 @@ mod turn;
 mod world;
 
 pub use self::messages::{
-    ArmPose, ArmSettings, CommandEffort, CommandGoal, Connect, EndGoal, HeldLimit, MoveSetpoint,
-    SetListener, SetSetpoint, SimulationTime, TakeSnapshot, TrackGoal,
+    ArmPose, ArmSettings, AttachNodes, CommandEffort, CommandGoal, EndGoal, HeldLimit,
+    MoveSetpoint, SetListener, SetSetpoint, SimulationTime, TakeSnapshot, TrackGoal,
 };
 pub use self::node::ArmSim;
 pub use self::orders::ArmOrder;

@@ -16,7 +16,7 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
-use super::messages::{ArmSettings, Connect, HeldLimit};
+use super::messages::{ArmSettings, AttachNodes, HeldLimit};
 use super::turn::Turn;
 use super::world::ArmWorld;
 use crate::actors::node::{Barrier, ClientLink, Interest, Publish, Reply};
@@ -44,7 +44,7 @@ pub struct ArmSim<const N: usize> {
     /// The node that predicts limits, if there is one.
     pub(super) study: Option<Recipient<HeldLimit<N>>>,
     /// The actors that inform clients of goals, which get barriers.
-    pub(super) owners: Vec<Recipient<Barrier>>,
+    pub(super) goal_reporters: Vec<Recipient<Barrier>>,
     /// Feedback of the goal that has been sent and not yet arrived.
     pub(super) feedback_sent: Option<Pin<Box<RecipientRequest<GoalProgress<N>>>>>,
 }
@@ -77,7 +77,7 @@ impl<const N: usize> ArmSim<N> {
             is_stepping: false,
             commander: None,
             study: None,
-            owners: Vec::new(),
+            goal_reporters: Vec::new(),
             feedback_sent: None,
         }
     }
@@ -123,12 +123,12 @@ impl<const N: usize> Handler<ArmSettings<N>> for ArmSim<N> {
     }
 }
 
-impl<const N: usize> Handler<Connect<N>> for ArmSim<N> {
+impl<const N: usize> Handler<AttachNodes<N>> for ArmSim<N> {
     type Result = ();
 
-    fn handle(&mut self, Connect { study, owners }: Connect<N>, _: &mut Context<Self>) {
-        self.study = study.or(self.study.take());
-        self.owners.extend(owners);
+    fn handle(&mut self, nodes: AttachNodes<N>, _: &mut Context<Self>) {
+        self.study = nodes.study.or(self.study.take());
+        self.goal_reporters.extend(nodes.goal_reporters);
     }
 }
 
@@ -187,13 +187,13 @@ impl<const N: usize> ArmSim<N> {
         }
     }
 
-    /// Answers after all news of goals have been published. The owner of a goal publishes them, and none may
-    /// follow the answer that the arm is at rest.
+    /// Answers after all feedback and results of goals have been sent. None may follow the answer that the arm is at
+    /// rest.
     pub(super) fn after_barriers(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
-        if self.owners.is_empty() {
+        if self.goal_reporters.is_empty() {
             return answer();
         }
-        let passed = pass_barriers(&self.owners).into_actor(self);
+        let passed = pass_barriers(&self.goal_reporters).into_actor(self);
         ctx.spawn(passed.map(move |(), _, _| answer()));
     }
 
@@ -213,11 +213,11 @@ impl<const N: usize> ArmSim<N> {
 }
 
 /// Sends a barrier to each of these actors, and waits until all have answered.
-pub(super) fn pass_barriers(owners: &[Recipient<Barrier>]) -> impl Future<Output = ()> + use<> {
-    let asked: Vec<_> = owners.iter().map(|owner| owner.send(Barrier)).collect();
+pub(super) fn pass_barriers(reporters: &[Recipient<Barrier>]) -> impl Future<Output = ()> + use<> {
+    let asked: Vec<_> = reporters.iter().map(|one| one.send(Barrier)).collect();
     async move {
         for one in asked {
-            // An owner that has ended publishes nothing.
+            // A node that has ended reports nothing.
             let _ = one.await;
         }
     }

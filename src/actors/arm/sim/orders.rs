@@ -111,12 +111,12 @@ impl<const N: usize> ArmOrder<N> for CommandEffort<N> {
 }
 
 /// Adds the topics to the registry's table.
-pub(super) fn listen<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
+pub(super) fn subscribe<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
     let hold = |setpoint, message: TopicMessage| SetSetpoint {
         setpoint,
         done: Some(message.done),
     };
-    nodes.listen(Topic::JointTrajectory, arm.clone(), read_setpoint, hold);
+    nodes.subscribe(Topic::JointTrajectory, arm.clone(), read_setpoint, hold);
     let command = |effort, message| CommandEffort { effort, message };
-    nodes.listen(Topic::EffortCommands, arm.clone(), read_effort, command);
+    nodes.subscribe(Topic::EffortCommands, arm.clone(), read_effort, command);
 }

@@ -22,7 +22,7 @@ use crate::services::goals::Solve;
 impl<const N: usize> ArmSim<N> {
     /// Adds this node's services and topics to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        orders::listen(address, nodes);
+        orders::subscribe(address, nodes);
         nodes.serve::<Disturb<N>>(Service::Disturb, address.clone());
         nodes.serve::<SetGains<N>>(Service::SetGains, address.clone());
         nodes.serve::<SetIntegrator>(Service::SetIntegrator, address.clone());
@@ -107,13 +107,13 @@ impl<const N: usize> ArmSim<N> {
         if !self.is_stepping {
             return;
         }
-        let owners = self.owners.clone();
+        let reporters = self.goal_reporters.clone();
         let others = async move {
             let Some(progress) = feedback_sent else {
                 return tokio::task::yield_now().await;
             };
             let _ = progress.await;
-            pass_barriers(&owners).await;
+            pass_barriers(&reporters).await;
         };
         ctx.spawn(others.into_actor(self).map(|(), arm, ctx| {
             if let Some(next) = arm.steps.pop_front() {

@@ -130,8 +130,6 @@ pub(super) enum AuthError {
     TooLate,
     #[error("this runtime requires its token first, in at most {MAX_AUTH_BYTES} bytes")]
     TooMuch,
-    #[error("this runtime requires its token first, and too many connections wait without a token")]
-    Crowded,
 }
 
 /// Checks whether a client's first frame has the token.

@@ -62,7 +62,7 @@ pub struct Connection<S> {
     /// Set if the client uses another protocol or violates a rule. It gets the reason, and its input is discarded.
     pub(super) is_refused: bool,
     /// Set when the reader has ended.
-    pub(super) is_read_to_its_end: bool,
+    pub(super) reader_has_ended: bool,
     /// Notifies the session that the runtime is ending.
     pub(super) finish: Arc<Notify>,
 }
@@ -91,7 +91,7 @@ impl<S: ClientStream> Connection<S> {
             is_running: false,
             is_finishing: false,
             is_refused: false,
-            is_read_to_its_end: false,
+            reader_has_ended: false,
             finish: Arc::default(),
         }
     }
@@ -217,8 +217,8 @@ impl<S: ClientStream> Connection<S> {
     fn next_release(&self) -> Option<Instant> {
         let release = self.outbox.next_release().map(Instant::from_std);
         let waits = self.outbox.has_topics() && !self.outbox.has_responses();
-        let look = self.flow.next_look().filter(|_| waits);
-        release.into_iter().chain(look).min()
+        let query = self.flow.next_query().filter(|_| waits);
+        release.into_iter().chain(query).min()
     }
 
     /// Whether the client has read nothing for too long while a long message waits.
@@ -228,7 +228,7 @@ impl<S: ClientStream> Connection<S> {
 
     /// The deadline of a client that takes no byte of a write. `None` if no response or long message waits, unless it
     /// is finishing. `taken` is the time when it last took a byte of the current write.
-    fn patience(&self, taken: Option<Instant>) -> Option<Instant> {
+    fn stall_deadline(&self, taken: Option<Instant>) -> Option<Instant> {
         let last_byte = taken.map_or(self.progress, |taken| taken.max(self.progress));
         match self.responses_since {
             Some(since) => Some(since.max(last_byte) + STALL_LIMIT),
@@ -336,7 +336,7 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientWriter {
             }
             writer.reader_due = Some(Instant::now() + LINGER);
         }
-        if client.is_read_to_its_end {
+        if client.reader_has_ended {
             return Poll::Ready(());
         }
         writer.timer.poll(writer.reader_due, cx)
@@ -357,7 +357,7 @@ impl ClientWriter {
             let Some(transport) = &mut client.transport else {
                 return Poll::Ready(false);
             };
-            let (patience, release) = if has_frames {
+            let (deadline, release) = if has_frames {
                 match transport.poll_write(cx, client.outbox.writing()) {
                     Poll::Ready(Ok(bytes)) => {
                         // After many bytes, other connections have a turn. The reader may continue.
@@ -376,7 +376,7 @@ impl ClientWriter {
                     Poll::Pending => {}
                 }
                 let taken = transport.last_taken();
-                (client.patience(taken), None)
+                (client.stall_deadline(taken), None)
             } else if is_done {
                 return self.poll_end(client, cx);
             } else {
@@ -387,8 +387,8 @@ impl ClientWriter {
                 self.turns.rest();
                 (None, client.next_release())
             };
-            ready!(self.timer.poll(patience.or(release), cx));
-            if patience.is_some() {
+            ready!(self.timer.poll(deadline.or(release), cx));
+            if deadline.is_some() {
                 return Poll::Ready(false);
             }
         }

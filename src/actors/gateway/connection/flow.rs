@@ -3,7 +3,7 @@
 //! Bytes in a client's socket get old, and cannot be dropped. The buffers of Linux hold 15 s of `/joint_states`. So a
 //! client slower than its topics is sent only as much as it reads in `AHEAD`. The rest is dropped before it is
 //! written. If a client's unread bytes are unknown, its socket's buffers are the only limit. A client that reads all
-//! its bytes within `HOLD` is never delayed.
+//! its bytes within `SLOW_AGE` is never delayed.
 //!
 //! Linux returns the unread bytes of a client on the same machine: `NETLINK_SOCK_DIAG` describes one socket in some
 //! microseconds, the client's socket too (`man 7 sock_diag`).
@@ -63,22 +63,22 @@ pub(super) fn has_closed(ends: Ends) -> bool {
 
 /// Nothing more is written once a byte has been unread for this time. Python reads 8 KiB at a time, which is half a
 /// second of messages to a client that reads at half the rate.
-const HOLD: Duration = Duration::from_millis(100);
+const SLOW_AGE: Duration = Duration::from_millis(100);
 /// A slow client is sent as much as it reads in this time.
 const AHEAD: Duration = Duration::from_millis(200);
 /// Largest age of a topic message ahead of a response, for a client that is far behind.
 pub(super) const FRESH: Duration = Duration::from_millis(200);
 /// Time between two queries of the client's unread bytes: after a query that found none, after one that found some, and
 /// while the client is slow. A query takes two system calls.
-const ASK_CALM: Duration = Duration::from_millis(300);
-const ASK: Duration = Duration::from_millis(100);
-const ASK_SLOW: Duration = Duration::from_millis(50);
+const QUERY_INTERVAL_IDLE: Duration = Duration::from_millis(300);
+const QUERY_INTERVAL: Duration = Duration::from_millis(100);
+const QUERY_INTERVAL_SLOW: Duration = Duration::from_millis(50);
 /// A slow client that reads all bytes within this time gets twice as much.
 const KEEPS_UP: Duration = Duration::from_millis(25);
 /// Window of the measured read rate. Also the time for which a client counts as slow.
-const MEMORY: Duration = Duration::from_secs(1);
+const RATE_WINDOW: Duration = Duration::from_secs(1);
 /// Bytes written within this time share one entry of the history.
-const GRAIN: Duration = Duration::from_millis(20);
+const HISTORY_STEP: Duration = Duration::from_millis(20);
 /// Most entries of the write history, which is 5 s of writing.
 const MAX_HISTORY: usize = 256;
 
@@ -127,15 +127,15 @@ impl FlowControl {
         }
         let is_full = self.history.len() >= MAX_HISTORY;
         match self.history.back_mut() {
-            Some((end, first)) if is_full || now < *first + GRAIN => *end = self.written,
+            Some((end, first)) if is_full || now < *first + HISTORY_STEP => *end = self.written,
             _ => self.history.push_back((self.written, now)),
         }
     }
 
-    /// Bytes of topic messages that may be written now. A limit is updated at [`next_look`](Self::next_look).
+    /// Bytes of topic messages that may be written now. A limit is updated at [`next_query`](Self::next_query).
     pub(super) fn room(&mut self, now: Instant) -> usize {
         if now >= self.next {
-            self.look(now);
+            self.query(now);
         }
         usize::try_from(self.room).unwrap_or(usize::MAX)
     }
@@ -151,12 +151,12 @@ impl FlowControl {
     }
 
     /// The time of the next query, if nothing may be written before it.
-    pub(super) fn next_look(&self) -> Option<Instant> {
+    pub(super) fn next_query(&self) -> Option<Instant> {
         (self.room == 0).then_some(self.next)
     }
 
-    fn look(&mut self, now: Instant) {
-        self.next = now + ASK;
+    fn query(&mut self, now: Instant) {
+        self.next = now + QUERY_INTERVAL;
         let Some(unread) = (self.source)() else {
             self.room = u64::MAX;
             return;
@@ -169,32 +169,32 @@ impl FlowControl {
         let oldest = self.history.front().filter(|_| unread > 0);
         let age = oldest.map_or(Duration::ZERO, |(_, first)| now.duration_since(*first));
         self.age = age;
-        let is_old = |(time, _): &(Instant, u64)| now.duration_since(*time) > MEMORY;
+        let is_old = |(time, _): &(Instant, u64)| now.duration_since(*time) > RATE_WINDOW;
         while self.read.front().is_some_and(is_old) {
             self.read.pop_front();
         }
         self.read.push_back((now, read));
-        if age > HOLD {
-            self.slow_until = Some(now + MEMORY);
+        if age > SLOW_AGE {
+            self.slow_until = Some(now + RATE_WINDOW);
             self.window = 0;
             self.room = 0;
         } else if self.slow_until.is_some_and(|until| now < until) {
             let doubled = if age < KEEPS_UP { 2 * self.window } else { 0 };
-            self.window = doubled.max(self.pace(now)).max(1);
+            self.window = doubled.max(self.bytes_ahead(now)).max(1);
             self.room = self.window.saturating_sub(unread);
         } else {
             self.slow_until = None;
             self.room = u64::MAX;
             if unread == 0 {
-                self.next = now + ASK_CALM;
+                self.next = now + QUERY_INTERVAL_IDLE;
             }
             return;
         }
-        self.next = now + ASK_SLOW;
+        self.next = now + QUERY_INTERVAL_SLOW;
     }
 
     /// Bytes that the client reads in [`AHEAD`], at its rate over the last second.
-    fn pace(&self, now: Instant) -> u64 {
+    fn bytes_ahead(&self, now: Instant) -> u64 {
         let (Some((since, first)), Some((_, last))) = (self.read.front(), self.read.back()) else {
             return 0;
         };

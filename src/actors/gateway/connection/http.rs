@@ -17,8 +17,8 @@ use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Incoming, Op, Verbosity};
 use crate::web::serve::{self, Gate};
 
-/// A client without a place: its slot, and the reason. `None` means that the token is missing.
-pub(super) type Newcomer<'a> = (HeldSlot<'a>, Option<Refused>);
+/// A client without a place: its slot, and the reason.
+pub(super) type Newcomer<'a> = (HeldSlot<'a>, Refused);
 
 /// Asks the session whether a client is admitted. The session takes only the first request of a client without a place.
 struct HttpGate<'a> {
@@ -70,7 +70,7 @@ impl ClientSession {
                         place = Some(held);
                         Ok(())
                     }
-                    Err(why) => Err(self.turn_away(Some(why))),
+                    Err(why) => Err(self.turn_away(why)),
                 };
                 let _ = request.map(|reply| reply.send(answer));
             }
@@ -87,7 +87,7 @@ impl ClientSession {
         let (stream, behind) = serve::serve(stream, first, due, site, &gate, cut_off).await?;
         let place = place?;
         let quiet = Request {
-            from: place.id(),
+            from: place.id,
             incoming: Incoming {
                 id: None,
                 op: Ok(Op::SetLevel {

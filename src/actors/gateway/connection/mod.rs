@@ -106,7 +106,7 @@ impl<S: ClientStream> Connection<S> {
         };
         let reading = reading
             .then(|(), _, _| ActorFutureExt::<Self>::timeout(Discarder::default(), DISCARD_TIME))
-            .map(|_, connection, _| connection.is_read_to_its_end = true);
+            .map(|_, connection, _| connection.reader_has_ended = true);
         Self::run("reader", reading, ctx);
         let writing = ClientWriter::default().map(|(), _: &mut Self, ctx| ctx.stop());
         Self::run("writer", writing, ctx);

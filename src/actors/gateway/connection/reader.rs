@@ -216,21 +216,32 @@ impl ClientReader {
         }
         ready!(self.poll_may_read(client, cx))?;
         let transport = client.transport()?;
-        let takes_binary = transport.is_socket();
         self.held.give_back(transport.is_long_coming());
         let part = transport.cut()?;
         let is_long_coming = transport.is_long_coming();
         if part.is_some() || !transport.is_unfinished() {
             self.frame_due = None;
         }
-        self.ops += usize::from(part.is_some());
         Poll::Ready(Ok(match part {
-            Some(FramePart::Lines(lines)) => {
+            Some(part) => self.take_part(client, part),
+            None => self.wait_for_rest(client, is_long_coming),
+        }))
+    }
+
+    /// Starts to read a frame, or performs lines or an error that need no reading.
+    fn take_part<S: ClientStream>(
+        &mut self,
+        client: &mut Connection<S>,
+        part: FramePart,
+    ) -> ReadStep {
+        self.ops += 1;
+        match part {
+            FramePart::Lines(lines) => {
                 (self.speaks_json, client.is_single) = (true, false);
                 let op = Ok(Op::PublishLines(lines));
                 self.perform(client, Incoming { id: None, op }, 0)
             }
-            Some(FramePart::Frame(frame)) => {
+            FramePart::Frame(frame) => {
                 (self.speaks_json, client.is_single) = (true, !frame.newline());
                 let memory = client.gauges.memory().clone();
                 let mut held = mem::take(&mut self.held);
@@ -239,36 +250,42 @@ impl ClientReader {
                     (held, parsed)
                 }))
             }
-            Some(FramePart::Error(FrameError::NotAnObject(start), _))
-                if !self.speaks_json && !takes_binary && is_host_line(&start) =>
+            FramePart::Error(FrameError::NotAnObject(start), _)
+                if !self.speaks_json && !client.is_socket() && is_host_line(&start) =>
             {
                 client.refuse(Foreign::Http.explanation());
                 ReadStep::Cutting
             }
-            Some(FramePart::Error(error, start)) => {
+            FramePart::Error(error, start) => {
                 self.perform(client, op::read_start(&start, &error), 0)
             }
-            // The answers of a client that reads nothing would wait in memory. A client with messages is read until it
-            // answers the close frame.
-            None if client.is_finishing && !takes_binary => {
-                self.has_ended = true;
-                self.chunk.clear();
-                ReadStep::Reading
-            }
-            None if is_long_coming && self.held.permit.is_none() => {
-                self.frame_due = None;
-                let (memory, ends) = (client.gauges.memory().clone(), client.ends);
-                // The end of the stream comes after bytes that are not read without a permit.
-                ReadStep::WaitingForRoom(Box::pin(async move {
-                    tokio::select! {
-                        biased;
-                        permit = memory.long_frame() => Ok(permit),
-                        () = closed(ends) => Err(ClientLost::Gone),
-                    }
-                }))
-            }
-            None => ReadStep::Reading,
-        }))
+        }
+    }
+
+    /// Reads on, for the rest of a frame. A long frame first waits for its memory permit.
+    fn wait_for_rest<S: ClientStream>(
+        &mut self,
+        client: &Connection<S>,
+        is_long_coming: bool,
+    ) -> ReadStep {
+        if client.is_finishing && !client.is_socket() {
+            // Answers to further frames would wait in memory if the client reads nothing. A WebSocket is read until its
+            // close frame.
+            self.has_ended = true;
+            self.chunk.clear();
+        } else if is_long_coming && self.held.permit.is_none() {
+            self.frame_due = None;
+            let (memory, ends) = (client.gauges.memory().clone(), client.ends);
+            // The end of the stream comes after bytes that are not read without a permit.
+            return ReadStep::WaitingForRoom(Box::pin(async move {
+                tokio::select! {
+                    biased;
+                    permit = memory.long_frame() => Ok(permit),
+                    () = closed(ends) => Err(ClientLost::Gone),
+                }
+            }));
+        }
+        ReadStep::Reading
     }
 
     /// Reads more data, or refuses the client if an incomplete frame takes too long. Meanwhile drops expired pieces of
@@ -353,7 +370,7 @@ impl ClientReader {
             _ => {}
         }
         let request = Request {
-            from: self.place.id(),
+            from: self.place.id,
             incoming,
             permit: self.held.permit.clone(),
         };
@@ -366,7 +383,7 @@ impl ClientReader {
 
     /// Withdraws the client's registrations, because it can no longer answer calls.
     fn retire<S: ClientStream>(&self, client: &Connection<S>) -> ReadStep {
-        let retired = client.registry.send(Retire(self.place.id()));
+        let retired = client.registry.send(Retire(self.place.id));
         let gone = timeout(RESPONSES_TIME, closed(client.ends));
         ReadStep::Retiring(Some(Box::pin(effect(retired))), Box::pin(gone))
     }
@@ -376,7 +393,7 @@ impl ClientReader {
         client.abandon_computations();
         self.held = HeldInput::default();
         // Answers already sent arrive before the registry's reply.
-        let left = client.registry.send(Disconnect(self.place.id()));
+        let left = client.registry.send(Disconnect(self.place.id));
         ReadStep::Leaving(Box::pin(left))
     }
 }

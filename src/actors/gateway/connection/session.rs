@@ -55,14 +55,8 @@ pub(super) struct Opened<S> {
 
 /// The place of a registered client. Dropping it frees the place.
 pub(super) struct HeldPlace {
-    id: ConnectionId,
+    pub(super) id: ConnectionId,
     registry: Addr<Registry>,
-}
-
-impl HeldPlace {
-    pub(super) const fn id(&self) -> ConnectionId {
-        self.id
-    }
 }
 
 impl Drop for HeldPlace {
@@ -93,13 +87,13 @@ impl ClientSession {
         let asks_token = self.admission.token.is_some();
         let mut place = if asks_token {
             // A client without the token makes no request to the registry.
-            Err(None)
+            Err(Refused::NoToken)
         } else {
-            self.connect(false).await.map_err(Some)
+            self.connect(false).await
         };
         let how = match place {
             Ok(_) => self.detect(&mut stream, &mut first, None).await,
-            Err(Some(Refused::Closed)) => Detected::Json,
+            Err(Refused::Closed) => Detected::Json,
             Err(why) => {
                 let slot = self.admission.newcomers.take();
                 let time = if asks_token { HEAD_TIME } else { OPENING_TIME };
@@ -117,8 +111,8 @@ impl ClientSession {
                     Detected::Http(due) => {
                         return self.serve_http(stream, first, due, Err((slot, why))).await;
                     }
-                    Detected::Command => self.wait_for_place(&slot).await.map_err(Some),
-                    Detected::Json => self.connect(false).await.map_err(Some),
+                    Detected::Command => self.wait_for_place(&slot).await,
+                    Detected::Json => self.connect(false).await,
                     Detected::Refused(_) | Detected::Gone => place,
                 };
                 how
@@ -185,11 +179,8 @@ impl ClientSession {
         }
     }
 
-    /// Counts a client that gets no place. Returns the reason. `None` means that the token is missing.
-    pub(super) fn turn_away(&self, why: Option<Refused>) -> String {
-        let Some(why) = why else {
-            return AuthError::Crowded.to_string();
-        };
+    /// Counts a client that gets no place. Returns the reason.
+    pub(super) fn turn_away(&self, why: Refused) -> String {
         if matches!(why, Refused::Full { .. }) {
             self.registry.do_send(CountRefusal);
         }
@@ -272,7 +263,7 @@ impl ClientSession {
     }
 
     /// Closes an evicted client. Sends the reason if the socket accepts it without delay.
-    async fn refuse_evicted<S>(&self, stream: &mut S, first: &[u8], why: Option<Refused>)
+    async fn refuse_evicted<S>(&self, stream: &mut S, first: &[u8], why: Refused)
     where
         S: AsyncWrite + Unpin,
     {

@@ -12,19 +12,19 @@ use crate::protocol::ros::rosapi::{Census, Listed, MAX_LISTED};
 
 /// The services and the actions by their absolute names, each with its provider.
 #[derive(Default)]
-pub(crate) struct Directory(BTreeMap<Served, BTreeMap<Arc<str>, Provider>>);
+pub(super) struct Directory(BTreeMap<Served, BTreeMap<Arc<str>, Provider>>);
 
 /// The client that serves a service or an action.
-pub(crate) struct Provider {
-    pub(crate) connection: ConnectionId,
+pub(super) struct Provider {
+    pub(super) connection: ConnectionId,
     /// The provider's spelling of the name. Requests to it have this spelling.
-    pub(crate) spelling: Box<str>,
+    pub(super) spelling: Box<str>,
     type_name: Option<Arc<str>>,
 }
 
 impl Directory {
     /// Makes a client the provider of `name`. The newest registration wins. Returns the previous provider.
-    pub(crate) fn provide(
+    pub(super) fn provide(
         &mut self,
         kind: Served,
         name: &str,
@@ -41,12 +41,12 @@ impl Directory {
         Some(before.connection)
     }
 
-    pub(crate) fn provider(&self, kind: Served, name: &str) -> Option<&Provider> {
+    pub(super) fn provider(&self, kind: Served, name: &str) -> Option<&Provider> {
         self.0.get(&kind)?.get(name)
     }
 
     /// Withdraws a name if `connection` is its provider. Returns whether it was.
-    pub(crate) fn withdraw(&mut self, kind: Served, name: &str, connection: ConnectionId) -> bool {
+    pub(super) fn withdraw(&mut self, kind: Served, name: &str, connection: ConnectionId) -> bool {
         let is_ours = |one: &Provider| one.connection == connection;
         let is_served = self.provider(kind, name).is_some_and(is_ours);
         if is_served && let Some(served) = self.0.get_mut(&kind) {
@@ -56,7 +56,7 @@ impl Directory {
     }
 
     /// Lists the topics, services and actions, up to the limit of each list.
-    pub(crate) fn census(&self, topics: impl Iterator<Item = Listed>) -> Census {
+    pub(super) fn census(&self, topics: impl Iterator<Item = Listed>) -> Census {
         let listed = |kind| {
             let all = self.0.get(&kind).into_iter().flatten().take(MAX_LISTED);
             let all = all.map(|(name, one)| Listed {

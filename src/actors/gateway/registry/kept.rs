@@ -10,11 +10,11 @@ use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_KEPT};
 
 /// The sum of one client's entries \[bytes\]. Clones share it.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Kept(Rc<Cell<usize>>);
+pub(super) struct Kept(Rc<Cell<usize>>);
 
 /// One entry.
 #[derive(Debug)]
-pub(crate) struct KeptEntry {
+pub(super) struct KeptEntry {
     sum: Kept,
     bytes: usize,
 }
@@ -22,7 +22,7 @@ pub(crate) struct KeptEntry {
 impl Kept {
     /// Adds an entry whose names have `names` bytes. The caller drops `instead` next, so its bytes do not count towards
     /// the limit.
-    pub(crate) fn enter(
+    pub(super) fn enter(
         &self,
         names: usize,
         instead: Option<&KeptEntry>,

@@ -14,11 +14,11 @@ const WARNING_INTERVAL: Duration = Duration::from_secs(60);
 
 /// The places, and the refusals since the last warning.
 #[derive(Debug)]
-pub(crate) struct Places {
+pub(super) struct Places {
     /// The number of places.
-    pub(crate) clients: usize,
+    pub(super) clients: usize,
     /// The number of kept places.
-    pub(crate) kept: usize,
+    pub(super) kept: usize,
     refused: u64,
     warned: Option<Instant>,
 }
@@ -31,7 +31,7 @@ impl Default for Places {
 
 impl Places {
     /// Places for `clients` clients. At least one of them is not kept.
-    pub(crate) fn of(clients: usize) -> Self {
+    pub(super) fn of(clients: usize) -> Self {
         let kept = clients.div_ceil(16).min(KEPT_PLACES);
         Self {
             clients,
@@ -42,13 +42,13 @@ impl Places {
     }
 
     /// Whether there is a place for one more client when `taken` places are in use.
-    pub(crate) const fn has_room(&self, taken: usize, may_use_kept: bool) -> bool {
+    pub(super) const fn has_room(&self, taken: usize, may_use_kept: bool) -> bool {
         let kept = if may_use_kept { 0 } else { self.kept };
         taken + kept < self.clients
     }
 
     /// Counts a refusal. Returns the number of refusals since the last warning, if the next warning is due.
-    pub(crate) fn count_refusal(&mut self, now: Instant) -> Option<u64> {
+    pub(super) fn count_refusal(&mut self, now: Instant) -> Option<u64> {
         self.refused += 1;
         if self
             .warned

@@ -8,7 +8,7 @@ use crate::services::NoService;
 
 /// An op or a call that changed nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum Refusal {
+pub(super) enum Refusal {
     #[error("topic: {0} belongs to the runtime; a client can't advertise it or publish there")]
     RuntimeTopic(String),
     #[error(

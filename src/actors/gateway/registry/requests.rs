@@ -40,58 +40,57 @@ impl Registry {
         call: CallService,
         ctx: &mut Context<Self>,
     ) -> Handled {
-        let Some(client) = self.clients.get(&origin.from) else {
-            return Handled::at_once();
-        };
-        let refusal = if let Some(why) = self.closed {
-            Err(Refusal::Closed(why))
-        } else if let Some(service) = Service::from_name(&call.service) {
-            match self.nodes.services.get(&service) {
-                Some(node) => {
-                    if let Some(tap) = &mut self.tap {
-                        tap(Tapped::Called {
-                            from: origin.from,
-                            service,
-                            id: origin.id.as_ref(),
-                            args: &call.args,
-                        });
-                    }
-                    let address = Address::new(service, call.service.into_boxed_str(), origin.id)
-                        .with_errors(client.error_form);
-                    let (caller, ended) = Caller::new(
-                        client.link.clone(),
-                        address,
-                        self.gauges.memory().clone(),
-                        self.permit.clone(),
-                    );
-                    node(ServiceCall {
-                        service,
-                        arguments: call.args,
-                        caller,
-                    });
-                    return Handled::with(ended);
-                }
-                None => Err(NoService::NotServed(call.service.clone()).into()),
+        let own = Service::from_name(&call.service);
+        let refusal = match (self.closed, own) {
+            (Some(why), _) => Err(Refusal::Closed(why)),
+            (None, Some(service)) if self.nodes.services.contains_key(&service) => {
+                return self.call_node(service, origin, call);
             }
-        } else {
-            let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
-            let args = &call.args;
-            let encode = |spelling: &str, id: &str| messages::call(spelling, id, args);
-            let name = (&*call.service, &call.args);
-            self.forward(
-                &origin,
-                Served::Service,
-                name,
-                (Some(deadline), false),
-                encode,
-            )
+            (None, Some(_)) => Err(NoService::NotServed(call.service.clone()).into()),
+            (None, None) => {
+                let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
+                let (kind, args) = (Served::Service, &call.args);
+                let encode = |spelling: &str, id: &str| messages::call(spelling, id, args);
+                self.forward(
+                    &origin,
+                    kind,
+                    (&call.service, args),
+                    (Some(deadline), false),
+                    encode,
+                )
+            }
         };
         self.schedule_cleanup(ctx);
         if let Err(why) = refusal {
-            let own = Service::from_name(&call.service);
             self.refuse_call(&origin, &call.service, &why, own);
         }
         Handled::at_once()
+    }
+
+    /// Sends a call to the node that serves it, and shows it to the tap.
+    fn call_node(&mut self, service: Service, origin: FrameOrigin, call: CallService) -> Handled {
+        let client = self.clients.get(&origin.from);
+        let Some((node, client)) = self.nodes.services.get(&service).zip(client) else {
+            return Handled::at_once();
+        };
+        if let Some(tap) = &mut self.tap {
+            tap(Tapped::Called {
+                from: origin.from,
+                service,
+                id: origin.id.as_ref(),
+                args: &call.args,
+            });
+        }
+        let address = Address::new(service, call.service.into_boxed_str(), origin.id)
+            .with_errors(client.error_form);
+        let (link, memory) = (client.link.clone(), self.gauges.memory().clone());
+        let (caller, ended) = Caller::new(link, address, memory, self.permit.clone());
+        node(ServiceCall {
+            service,
+            arguments: call.args,
+            caller,
+        });
+        Handled::with(ended)
     }
 
     /// Sends a goal to the node, or the client, that serves its action. A failure is the goal's one result.
@@ -99,10 +98,9 @@ impl Registry {
         let Some(client) = self.clients.get(&origin.from) else {
             return Handled::at_once();
         };
-        let refusal = if let Some(why) = self.closed {
-            Err(Refusal::Closed(why))
-        } else if Action::from_name(&goal.action).is_some() {
-            match self.action_route(&goal) {
+        let refusal = match (self.closed, Action::from_name(&goal.action)) {
+            (Some(why), _) => Err(Refusal::Closed(why)),
+            (None, Some(action)) => match self.action_route(action, &goal) {
                 Ok(node) => {
                     let (done, ended) = guard();
                     let client = ActionClient {
@@ -116,14 +114,15 @@ impl Registry {
                     return Handled::with(ended);
                 }
                 Err(why) => Err(why),
+            },
+            (None, None) => {
+                let (type_name, args) = (goal.type_name.as_deref(), &goal.args);
+                let encode = |spelling: &str, id: &str| {
+                    messages::action_goal(spelling, id, type_name, args, goal.feedback)
+                };
+                let name = (&*goal.action, args);
+                self.forward(&origin, Served::Action, name, (None, goal.feedback), encode)
             }
-        } else {
-            let (type_name, args) = (goal.type_name.as_deref(), &goal.args);
-            let encode = |spelling: &str, id: &str| {
-                messages::action_goal(spelling, id, type_name, args, goal.feedback)
-            };
-            let name = (&*goal.action, &goal.args);
-            self.forward(&origin, Served::Action, name, (None, goal.feedback), encode)
         };
         if let Err(why) = refusal {
             self.end_goal(&origin, &goal.action, &why, GoalStatus::Unknown);
@@ -131,14 +130,20 @@ impl Registry {
         Handled::at_once()
     }
 
-    fn action_route(&self, goal: &ActionGoal) -> Result<&Route<ActionRequest>, Refusal> {
-        let unknown = || Refusal::NoAction(goal.action.clone());
-        let action = Action::from_name(&goal.action).ok_or_else(unknown)?;
+    /// The node that serves an action of the runtime.
+    fn action_route(
+        &self,
+        action: Action,
+        goal: &ActionGoal,
+    ) -> Result<&Route<ActionRequest>, Refusal> {
         match &goal.type_name {
             Some(name) if !names::same_type(name, action.type_name()) => {
                 Err(Refusal::ActionType(action.type_name()))
             }
-            _ => self.nodes.actions.get(&action).ok_or_else(unknown),
+            _ => {
+                let unknown = || Refusal::NoAction(goal.action.clone());
+                self.nodes.actions.get(&action).ok_or_else(unknown)
+            }
         }
     }
 
@@ -200,7 +205,7 @@ impl Registry {
     }
 
     /// Makes a client the provider of a service, or the server of an action.
-    pub(super) fn serve(
+    fn serve(
         &mut self,
         origin: &FrameOrigin,
         kind: Served,
@@ -235,7 +240,7 @@ impl Registry {
     }
 
     /// Withdraws a name. The client still answers its pending calls and goals.
-    pub(super) fn stop_serving(
+    fn stop_serving(
         &mut self,
         origin: &FrameOrigin,
         kind: Served,
@@ -327,7 +332,7 @@ impl Registry {
     }
 
     /// Sends feedback to the sender of the goal, if it requested feedback. A slow client may miss some.
-    pub(super) fn pass_feedback(
+    fn pass_feedback(
         &self,
         origin: &FrameOrigin,
         action: &str,
@@ -349,7 +354,7 @@ impl Registry {
     }
 
     /// Sends the provider's answer to the caller, under the caller's own id.
-    pub(super) fn complete(
+    fn complete(
         &mut self,
         origin: &FrameOrigin,
         kind: Served,

@@ -2,8 +2,7 @@
 //! spelling of its topic and each requested encoding, and is delivered to every subscriber.
 //!
 //! **Invariant:** a refused op changes nothing. Without subscribers nothing is encoded. Subscribers that requested the
-//! same encoding share the same bytes. A long message delays only its publisher. The table has a topic exactly as long
-//! as a client uses it. Each spelling of a topic has a connection at most once, for any number of subscriptions.
+//! same encoding share the same bytes. A long message delays only its publisher.
 
 use std::sync::Arc;
 
@@ -12,7 +11,8 @@ use bytes::Bytes;
 
 use super::forms::{Made, ToEncode};
 use super::refusal::Refusal;
-use super::{FrameOrigin, Handled, Registry, SetTap, Subscriber, Subscription, Tapped, ToClient};
+use super::topic_table::{Subscriber, Subscription};
+use super::{FrameOrigin, Handled, Registry, SetTap, Tapped, ToClient};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::MAX_LONG_FORMS;
 use crate::actors::node::{Done, Interest, Publish, TopicMessage, guard};
@@ -68,7 +68,7 @@ impl Registry {
         if client.registered.advertised.remove(topic).is_some() {
             self.topics.remove_publisher(topic);
         }
-        if let Some(topic) = Topic::from_name(topic).filter(|topic| is_listened_to(*topic)) {
+        if let Some(topic) = Topic::from_name(topic).filter(|topic| runtime_subscribes(*topic)) {
             client.withdrawn.insert(topic);
         }
     }
@@ -78,15 +78,45 @@ impl Registry {
         origin: &FrameOrigin,
         subscribe: &Subscribe,
     ) -> Result<(), Refusal> {
-        let id: Option<Box<str>> = origin.id.as_ref().map(|id| id.get().into());
         self.may_subscribe(subscribe)?;
+        let topic = subscribe.topic.as_str();
+        let is_first = !self.is_wanted(&names::absolute(topic));
+        let is_new = self.add_subscription(origin, subscribe)?;
+        // Sent first, so that the client gets the status before the first message.
+        let msg = format!("subscribed to {topic}");
+        self.send_status(origin, Level::Info, &msg);
+        if is_first {
+            self.notify_owner(topic, true);
+        } else if is_new {
+            self.deliver_latched(topic, origin.from);
+        }
+        Ok(())
+    }
+
+    fn may_subscribe(&self, subscribe: &Subscribe) -> Result<(), Refusal> {
+        let topic = subscribe.topic.as_str();
+        if subscribe.encoding.compression == Compression::CborRaw {
+            let own = || subscribe.type_name.as_deref().and_then(types::find);
+            if self.known_type(topic).is_none() && own().is_none() {
+                return Err(Refusal::UnknownType);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds a subscription, or replaces the one with its id. Returns whether it is new.
+    fn add_subscription(
+        &mut self,
+        origin: &FrameOrigin,
+        subscribe: &Subscribe,
+    ) -> Result<bool, Refusal> {
+        let id: Option<Box<str>> = origin.id.as_ref().map(|id| id.get().into());
         let topic = subscribe.topic.as_str();
         let absolute = names::absolute(topic);
         let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
         let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
-        let first = !self.is_wanted(&absolute);
         let Some(client) = self.clients.get_mut(&origin.from) else {
-            return Ok(());
+            return Ok(false);
         };
         let known = self.topics.subscriber(&absolute, topic, origin.from);
         let before = known
@@ -106,8 +136,8 @@ impl Registry {
             let spelling: Arc<str> = topic.into();
             client.registered.subscribed.insert(Arc::clone(&spelling));
             let mailbox = client.outlets.mailbox.clone();
-            let new = Subscriber::new(origin.from, spelling, mailbox);
-            self.topics.add_subscriber(&absolute, new);
+            let topics = &mut self.topics;
+            topics.add_subscriber(&absolute, spelling, origin.from, mailbox);
         }
         if let Some(type_name) = subscribe.type_name.as_deref() {
             self.topics.note_type(&absolute, type_name);
@@ -120,26 +150,7 @@ impl Registry {
             }
             subscriber.configure(subscriber.throttle());
         }
-        // Sent first, so that the client gets the status before the first message.
-        let msg = format!("subscribed to {topic}");
-        self.send_status(origin, Level::Info, &msg);
-        if first {
-            self.tell_owner(topic, true);
-        } else if is_new {
-            self.deliver_latched(topic, origin.from);
-        }
-        Ok(())
-    }
-
-    fn may_subscribe(&self, subscribe: &Subscribe) -> Result<(), Refusal> {
-        let topic = subscribe.topic.as_str();
-        if subscribe.encoding.compression == Compression::CborRaw {
-            let own = || subscribe.type_name.as_deref().and_then(types::find);
-            if self.known_type(topic).is_none() && own().is_none() {
-                return Err(Refusal::UnknownType);
-            }
-        }
-        Ok(())
+        Ok(is_new)
     }
 
     pub(super) fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
@@ -170,10 +181,10 @@ impl Registry {
         if let Some(topic) = Topic::from_name(topic) {
             self.latched.remove(&topic);
         }
-        self.tell_owner(topic, false);
+        self.notify_owner(topic, false);
     }
 
-    fn tell_owner(&self, topic: &str, wanted: bool) {
+    fn notify_owner(&self, topic: &str, wanted: bool) {
         if let Some(topic) = Topic::from_name(topic)
             && let Some(owner) = self.nodes.publishers.get(&topic)
         {
@@ -203,7 +214,7 @@ impl Registry {
     }
 
     /// Removes a subscriber from a topic, and notifies the topic's owner if it was the last one.
-    pub(super) fn drop_subscriber(&mut self, topic: &str, connection: ConnectionId) {
+    fn drop_subscriber(&mut self, topic: &str, connection: ConnectionId) {
         let name = names::absolute(topic);
         self.topics.remove_subscriber(&name, topic, connection);
         if let Some(client) = self.clients.get_mut(&connection)
@@ -221,7 +232,7 @@ impl Registry {
 /// The encoding that a subscription requests. If it names the ROS 1 type of a topic of the runtime, stamps also have
 /// the names of ROS 1. CDR has no names.
 fn encoding_for(subscribe: &Subscribe) -> Encoding {
-    let own = Topic::from_name(&subscribe.topic).filter(|topic| !is_listened_to(*topic));
+    let own = Topic::from_name(&subscribe.topic).filter(|topic| !runtime_subscribes(*topic));
     let mut asked = own.zip(subscribe.type_name.as_deref()).into_iter();
     let is_ros1 = asked.any(|(topic, asked)| is_ros1_name(asked, topic.type_name()));
     Encoding {
@@ -231,15 +242,15 @@ fn encoding_for(subscribe: &Subscribe) -> Encoding {
 }
 
 /// Refuses the topics that only the runtime may publish.
-pub(super) fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
+fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
     match Topic::from_name(topic) {
-        Some(own) if !is_listened_to(own) => Err(Refusal::RuntimeTopic(topic.to_owned())),
+        Some(own) if !runtime_subscribes(own) => Err(Refusal::RuntimeTopic(topic.to_owned())),
         _ => Ok(()),
     }
 }
 
 /// Whether the runtime itself subscribes to the topic.
-pub(super) fn is_listened_to(topic: Topic) -> bool {
+fn runtime_subscribes(topic: Topic) -> bool {
     topic.direction() == Direction::Subscribed
 }
 
@@ -262,15 +273,15 @@ impl Registry {
         let Some(client) = self.clients.get(&origin.from) else {
             return Handled::at_once();
         };
-        let listener = Topic::from_name(topic)
-            .filter(|topic| is_listened_to(*topic) && !client.withdrawn.contains(topic))
-            .and_then(|topic| Some((topic, self.nodes.listeners.get(&topic)?)));
-        if listener.is_none() && !client.registered.advertised.contains_key(topic) {
+        let node = Topic::from_name(topic)
+            .filter(|topic| runtime_subscribes(*topic) && !client.withdrawn.contains(topic))
+            .and_then(|topic| Some((topic, self.nodes.subscribers.get(&topic)?)));
+        if node.is_none() && !client.registered.advertised.contains_key(topic) {
             return Handled::at_once();
         }
         let encode = |spelling: &str| messages::publish_raw(spelling, &msg);
         let delivered = self.fan_out(topic, encode);
-        let Some((topic, listener)) = listener else {
+        let Some((topic, node)) = node else {
             return self.finish_delivery(delivered, ctx);
         };
         let (done, ended) = guard();
@@ -279,7 +290,7 @@ impl Registry {
             let frame = messages::publish_raw(topic.name(), &msg);
             tap(Tapped::Published(topic, &frame));
         }
-        listener(TopicMessage {
+        node(TopicMessage {
             msg,
             link: client.link.clone(),
             listening: Arc::downgrade(&client.listening),
@@ -394,7 +405,7 @@ impl Registry {
     }
 
     /// Delivers a latched topic's last message to a new subscription.
-    pub(super) fn deliver_latched(&self, spelling: &str, to: ConnectionId) {
+    fn deliver_latched(&self, spelling: &str, to: ConnectionId) {
         let latched = Topic::from_name(spelling).map(|topic| (topic, self.latched.get(&topic)));
         let Some((topic, Some(frame))) = latched else {
             return;
@@ -411,7 +422,7 @@ impl Registry {
     }
 
     /// The type of a topic's messages: the runtime's own, or a known type that a client has given.
-    pub(super) fn known_type(&self, topic: &str) -> Option<&'static str> {
+    fn known_type(&self, topic: &str) -> Option<&'static str> {
         match Topic::from_name(topic) {
             Some(topic) => Some(topic.type_name()),
             None => Some(self.topics.known_type(&names::absolute(topic))?.name),
@@ -464,7 +475,7 @@ impl Handler<SetTap> for Registry {
         for topic in Topic::ALL {
             if self.topics.subscribers(topic.name()).is_empty() {
                 match (was_set, self.tap.is_some()) {
-                    (_, true) => self.tell_owner(topic.name(), true),
+                    (_, true) => self.notify_owner(topic.name(), true),
                     (true, false) => self.note_unwanted(topic.name()),
                     (false, false) => {}
                 }
@@ -494,31 +505,4 @@ fn deliver(subscriber: &Subscriber, frame: Bytes) {
     subscriber
         .mailbox
         .do_send(ToClient::Deliver { topic, frame });
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::Topics;
-    use crate::protocol::ros::rosapi::Listed;
-
-    #[test]
-    fn the_first_type_stays_with_a_topic_and_a_topic_with_its_last_user() {
-        let mut topics = Topics::default();
-        topics.add_publisher("/t");
-        topics.add_publisher("/t");
-        assert!(topics.note_type("/t", "a/b") && !topics.note_type("/t", "c/d"));
-        for _ in 0..2 {
-            let listed: Vec<Listed> = topics.listed().collect();
-            let one = Listed {
-                name: "/t".into(),
-                type_name: Some("a/b".into()),
-                published: true,
-                subscribed: false,
-            };
-            assert_eq!(listed, [one]);
-            topics.remove_publisher("/t");
-        }
-        assert_eq!(topics.listed().count(), 0);
-        assert!(!topics.note_type("/t", "a/b"));
-    }
 }

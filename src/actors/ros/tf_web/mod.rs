@@ -258,7 +258,7 @@ impl<const N: usize> TfRepublisher<N> {
     fn keep_timer(&mut self, ctx: &mut Context<Self>) {
         let is_wanted = self.topic.is_some() || !self.subscriptions.is_empty();
         match self.timer {
-            None if is_wanted => self.timer = Some(ctx.run_interval(PERIOD, Self::look)),
+            None if is_wanted => self.timer = Some(ctx.run_interval(PERIOD, Self::send_on_timer)),
             Some(timer) if !is_wanted => {
                 ctx.cancel_future(timer);
                 self.timer = None;
@@ -268,40 +268,41 @@ impl<const N: usize> TfRepublisher<N> {
     }
 
     /// Requests the arm's pose, and sends the due messages.
-    fn look(&mut self, ctx: &mut Context<Self>) {
+    fn send_on_timer(&mut self, ctx: &mut Context<Self>) {
         self.forget_gone();
         self.keep_timer(ctx);
         let asked = self.arm.send(ArmPose).into_actor(self);
         ctx.wait(asked.map(|pose, node, _| {
             if let Ok(pose) = pose {
-                node.tell(&pose);
+                node.send_due(&pose);
             }
         }));
     }
 
-    fn tell(&mut self, pose: &Pose<N>) {
+    /// Sends the messages that are due at this pose of the arm.
+    fn send_due(&mut self, pose: &Pose<N>) {
         let (now, stamp) = (Instant::now(), Stamp::from_seconds(pose.time));
         let seen = |target: &str, sources: &[String]| {
             let sources = sources.iter().map(String::as_str);
             seen_from(stamp, target, sources, &pose.lengths, &pose.state.position)
         };
         // A message is sent at the nearest tick: the next tick would be later than this one is early.
-        let soon = now + PERIOD / 2;
-        if let Some(due) = self.topic.as_mut().filter(|due| **due <= soon) {
-            *due = next(*due, TOPIC_PERIOD, now);
+        let latest = now + PERIOD / 2;
+        if let Some(due) = self.topic.as_mut().filter(|due| **due <= latest) {
+            *due = next_due(*due, TOPIC_PERIOD, now);
             publish(&self.publish, Topic::TfWeb, seen(WORLD, &frames(N)));
         }
         let mut due: Vec<_> = self
             .subscriptions
             .iter_mut()
-            .filter(|(_, due)| *due <= soon)
+            .filter(|(_, due)| *due <= latest)
             .collect();
         // The longest overdue are first.
         due.sort_by_key(|(_, due)| *due);
         for (order, (subscription, due)) in (0..).zip(due.into_iter().take(AT_ONCE)) {
             // A nanosecond keeps the order, so requests that are always due take turns.
             let sent = now + Duration::from_nanos(order);
-            *due = next(*due, subscription.goal.period, sent);
+            *due = next_due(*due, subscription.goal.period, sent);
             let message = seen(&subscription.goal.target, &subscription.goal.sources);
             match &subscription.by {
                 FrameReceiver::Client(client) => client.feed_back(message),
@@ -315,7 +316,7 @@ impl<const N: usize> TfRepublisher<N> {
 }
 
 /// The next due time of a message that was due at `due` and is sent `now`. A delay of up to a period is made up.
-fn next(due: Instant, period: Duration, now: Instant) -> Instant {
+fn next_due(due: Instant, period: Duration, now: Instant) -> Instant {
     (due + period).max(now)
 }
 

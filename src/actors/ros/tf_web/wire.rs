@@ -30,7 +30,7 @@ impl<const N: usize> TfRepublisher<N> {
     /// Adds this node's service, action and topics to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<RepublishTfs>(Service::RepublishTfs, address.clone());
-        nodes.carry_out::<FrameGoal<N>, _>(address.clone());
+        nodes.serve_action::<FrameGoal<N>, _>(address.clone());
         let subscribe = |(id, goal), message: TopicMessage| {
             let by = FrameReceiver::Topic {
                 id,
@@ -39,9 +39,9 @@ impl<const N: usize> TfRepublisher<N> {
             };
             SubscribeFrames { goal, by }
         };
-        nodes.listen(Topic::TfWebGoal, address.clone(), read_goal::<N>, subscribe);
+        nodes.subscribe(Topic::TfWebGoal, address.clone(), read_goal::<N>, subscribe);
         let cancel = |id, _| UnsubscribeFrames(id);
-        nodes.listen(Topic::TfWebCancel, address.clone(), read_cancel, cancel);
+        nodes.subscribe(Topic::TfWebCancel, address.clone(), read_cancel, cancel);
         for topic in [Topic::TfWeb, Topic::TfWebFeedback] {
             nodes.publishers.insert(topic, address.clone().recipient());
         }

@@ -46,8 +46,15 @@ impl Consulting {
             })
         });
         let study = Some(study);
-        let owners = Vec::new();
-        stage.arm.send(Connect { study, owners }).await.unwrap();
+        let goal_reporters = Vec::new();
+        stage
+            .arm
+            .send(AttachNodes {
+                study,
+                goal_reporters,
+            })
+            .await
+            .unwrap();
         Self {
             client: stage.connect(),
             stage,
