@@ -138,6 +138,7 @@ pub(super) struct TopicEntry {
     pub(super) constants: &'static [Constant],
     pub(super) direction: Direction,
     pub(super) latched: bool,
+    pub(super) supersedes: &'static [&'static str],
 }
 
 /// A topic that the runtime publishes.
@@ -155,6 +156,7 @@ pub(super) const fn published(
         constants: &[],
         direction: Direction::Published,
         latched: false,
+        supersedes: &[],
     }
 }
 
@@ -176,6 +178,14 @@ impl TopicEntry {
     pub(super) const fn latched(self) -> Self {
         Self {
             latched: true,
+            ..self
+        }
+    }
+
+    /// After a message, no earlier message of these topics may follow.
+    pub(super) const fn supersedes(self, topics: &'static [&'static str]) -> Self {
+        Self {
+            supersedes: topics,
             ..self
         }
     }
