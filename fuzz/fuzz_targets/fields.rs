@@ -129,7 +129,7 @@ impl<'a> Model<'a> {
         };
         Some(Self {
             values,
-            null_is_absent: service.all_or_nothing(),
+            null_is_absent: service.null_is_absent(),
             prefix: String::new(),
             refused: Vec::new(),
         })

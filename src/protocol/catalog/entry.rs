@@ -204,7 +204,7 @@ pub(super) struct ServiceEntry {
     pub(super) request: &'static [Field],
     pub(super) response: &'static [Field],
     pub(super) is_computation: bool,
-    pub(super) is_all_or_nothing: bool,
+    pub(super) null_is_absent: bool,
     pub(super) supersedes: &'static [&'static str],
 }
 
@@ -221,7 +221,7 @@ pub(super) const fn service(
         request: &[],
         response: &[],
         is_computation: false,
-        is_all_or_nothing: false,
+        null_is_absent: false,
         supersedes: &[],
     }
 }
@@ -245,10 +245,10 @@ impl ServiceEntry {
         }
     }
 
-    /// One bad field rejects the whole request.
-    pub(super) const fn all_or_nothing(self) -> Self {
+    /// `null` in an optional field means absent.
+    pub(super) const fn null_is_absent(self) -> Self {
         Self {
-            is_all_or_nothing: true,
+            null_is_absent: true,
             ..self
         }
     }
