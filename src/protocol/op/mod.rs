@@ -378,8 +378,9 @@ impl<'a> OpReader<'a> {
 
     /// A call. Once its service is known, every other fault gets a `service_response`.
     fn call(&self) -> Result<Op, OpError> {
-        let service = self.name("service").map_err(OpError::Status)?;
-        match self.timeout() {
+        let service = self.any_name("service").map_err(OpError::Status)?;
+        let is_short = self.short("service", &service);
+        match is_short.and_then(|()| self.timeout()) {
             Ok(timeout) => Ok(Op::CallService(CallService {
                 service,
                 args: self.args(),
@@ -559,10 +560,16 @@ impl<'a> OpReader<'a> {
 
     /// A topic or service name.
     fn name(&self, field: &'static str) -> Result<String, Problem> {
+        let name = self.any_name(field)?;
+        self.short(field, &name)?;
+        Ok(name)
+    }
+
+    /// A name of any length.
+    fn any_name(&self, field: &'static str) -> Result<String, Problem> {
         let name = self.typed(field, "a non-empty string", |raw| {
             json::text(raw).filter(|name| !name.is_empty())
         })?;
-        self.short(field, &name)?;
         Ok(name.into_owned())
     }
 
@@ -616,12 +623,15 @@ impl<'a> OpReader<'a> {
         args.map_or_else(Payload::empty_object, Payload::from)
     }
 
+    /// As in rosbridge, 0 or less means no timeout, which here is the longest one.
     fn timeout(&self) -> Result<Option<Duration>, Problem> {
-        let expected = "a number of seconds greater than 0";
-        let timeout = self.optional("timeout", expected, |raw| {
-            json::number(raw).filter(|timeout| timeout.is_finite() && *timeout > 0.0)
+        let timeout = self.optional("timeout", "a finite number of seconds", |raw| {
+            json::number(raw).filter(|timeout| timeout.is_finite())
         })?;
-        Ok(timeout.map(|timeout| duration(timeout, MAX_TIMEOUT)))
+        Ok(timeout.map(|timeout| match timeout > 0.0 {
+            true => duration(timeout, MAX_TIMEOUT),
+            false => MAX_TIMEOUT,
+        }))
     }
 }
 
@@ -635,7 +645,7 @@ fn duration(seconds: f64, longest: Duration) -> Duration {
 impl OpReader<'_> {
     /// A goal. Once its action is known, every other fault gets an `action_result`.
     fn goal(&self) -> Result<Op, OpError> {
-        let action = self.name("action").map_err(OpError::Status)?;
+        let action = self.any_name("action").map_err(OpError::Status)?;
         match self.goal_for(&action) {
             Ok(goal) => Ok(Op::SendActionGoal(goal)),
             Err(problem) => Err(OpError::Goal { action, problem }),
@@ -643,6 +653,7 @@ impl OpReader<'_> {
     }
 
     fn goal_for(&self, action: &str) -> Result<ActionGoal, Problem> {
+        self.short("action", action)?;
         if let Some(id) = self.get("id") {
             self.short("id", id.get())?;
         }
@@ -691,9 +702,10 @@ impl OpReader<'_> {
             _ => {
                 let is_good = self.boolean("result")?;
                 ProviderOp::End {
-                    // Here a failure may also have none.
+                    // Here they may be missing: a result without fields, or a failure without a reason.
                     values: match self.get("values") {
                         Some(_) if is_good => self.object("values")?,
+                        None if is_good => Payload::empty_object(),
                         values => Payload::from(values.unwrap_or(RawValue::NULL)),
                     },
                     status: self.goal_status(is_good)?,
