@@ -129,7 +129,7 @@ impl<'a> Model<'a> {
         };
         Some(Self {
             values,
-            null_is_absent: service.all_or_nothing(),
+            null_is_absent: service.null_is_absent(),
             prefix: String::new(),
             refused: Vec::new(),
         })
@@ -190,18 +190,14 @@ impl<'a> Model<'a> {
     }
 }
 
-/// The members of an object. `None` if one of its keys is no text and could be any name.
+/// The members of an object. `None` if it is none.
 fn members<'a>(
     fields: &[Field],
     object: &'a Json,
 ) -> Option<Vec<(&'static str, Option<&'a Json>)>> {
-    let Json::Object(all) = object else {
-        return None;
-    };
     let named = |field: &Field| (field.name, object.get(field.name));
-    all.iter()
-        .all(|(key, _)| key.is_some())
-        .then(|| fields.iter().map(named).collect())
+    let is_object = matches!(object, Json::Object(_));
+    is_object.then(|| fields.iter().map(named).collect())
 }
 
 fn within(number: f64, bound: Bound) -> bool {

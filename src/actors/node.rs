@@ -638,14 +638,22 @@ impl ActionClient {
 
     /// Sends the result of the goal.
     pub fn conclude(&self, values: impl Serialize, status: GoalStatus) {
-        let result = status != GoalStatus::Unknown;
+        self.end(values, status, true);
+    }
+
+    /// Sends the reason why the goal has no result. In this case clients expect a text in `values`.
+    pub fn fail(&self, why: &str, status: GoalStatus) {
+        self.end(why, status, false);
+    }
+
+    /// Sends the reason why the goal was not accepted.
+    pub fn refuse(&self, why: &str) {
+        self.fail(why, GoalStatus::Unknown);
+    }
+
+    fn end(&self, values: impl Serialize, status: GoalStatus, result: bool) {
         let (action, id) = (&self.action, self.id.as_ref());
         let frame = messages::action_result(action, id, &values, status as u8, result);
         self.link.send(FrameKind::End, frame, None);
-    }
-
-    /// Sends the reason why the goal was not accepted. In this case clients expect a text in `values`.
-    pub fn refuse(&self, why: &str) {
-        self.conclude(why, GoalStatus::Unknown);
     }
 }

@@ -138,6 +138,7 @@ pub(super) struct TopicEntry {
     pub(super) constants: &'static [Constant],
     pub(super) direction: Direction,
     pub(super) latched: bool,
+    pub(super) supersedes: &'static [&'static str],
 }
 
 /// A topic that the runtime publishes.
@@ -155,6 +156,7 @@ pub(super) const fn published(
         constants: &[],
         direction: Direction::Published,
         latched: false,
+        supersedes: &[],
     }
 }
 
@@ -180,6 +182,14 @@ impl TopicEntry {
         }
     }
 
+    /// After a message, no earlier message of these topics may follow.
+    pub(super) const fn supersedes(self, topics: &'static [&'static str]) -> Self {
+        Self {
+            supersedes: topics,
+            ..self
+        }
+    }
+
     /// The topic's type has constants.
     pub(super) const fn constants(self, constants: &'static [Constant]) -> Self {
         Self { constants, ..self }
@@ -194,7 +204,7 @@ pub(super) struct ServiceEntry {
     pub(super) request: &'static [Field],
     pub(super) response: &'static [Field],
     pub(super) is_computation: bool,
-    pub(super) is_all_or_nothing: bool,
+    pub(super) null_is_absent: bool,
     pub(super) supersedes: &'static [&'static str],
 }
 
@@ -211,7 +221,7 @@ pub(super) const fn service(
         request: &[],
         response: &[],
         is_computation: false,
-        is_all_or_nothing: false,
+        null_is_absent: false,
         supersedes: &[],
     }
 }
@@ -235,10 +245,10 @@ impl ServiceEntry {
         }
     }
 
-    /// One bad field rejects the whole request.
-    pub(super) const fn all_or_nothing(self) -> Self {
+    /// `null` in an optional field means absent.
+    pub(super) const fn null_is_absent(self) -> Self {
         Self {
-            is_all_or_nothing: true,
+            null_is_absent: true,
             ..self
         }
     }

@@ -29,7 +29,7 @@ table! {
                 "float64[] velocities  # m/s",
             ])
             .computation()
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Method and timestep of the live arm.
         SetIntegrator = changes("/arm_sim/set_integrator", "pendularm_interfaces/srv/SetIntegrator")
             .request(METHOD)
@@ -60,38 +60,36 @@ table! {
                 "float64[] position  # rad",
                 "float64[] velocity  # rad/s",
                 "float64[] effort  # N m",
-            ])
-            .all_or_nothing(),
+            ]),
         /// Adds an effort for some time.
         Disturb = changes("/arm_sim/disturb", "pendularm_interfaces/srv/Disturb")
             .request(DISTURBANCE)
-            .response(DISTURBANCE)
-            .all_or_nothing(),
+            .response(DISTURBANCE),
         /// The names of the arm's parameters.
         ListParameters = of_arm("/arm_sim/list_parameters", "rcl_interfaces/srv/ListParameters")
             .request(fields!["string[] prefixes?", "uint64 depth?"])
             .response(fields!["rcl_interfaces/msg/ListParametersResult result"])
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Their values.
         GetParameters = of_arm("/arm_sim/get_parameters", "rcl_interfaces/srv/GetParameters")
             .request(NAMES)
             .response(fields!["rcl_interfaces/msg/ParameterValue[] values"])
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Their types.
         GetParameterTypes = of_arm("/arm_sim/get_parameter_types", "rcl_interfaces/srv/GetParameterTypes")
             .request(NAMES)
             .response(fields!["uint8[] types"])
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Their descriptions.
         DescribeParameters = of_arm("/arm_sim/describe_parameters", "rcl_interfaces/srv/DescribeParameters")
             .request(NAMES)
             .response(fields!["rcl_interfaces/msg/ParameterDescriptor[] descriptors"])
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Sets them.
         SetParameters = changes("/arm_sim/set_parameters", "rcl_interfaces/srv/SetParameters")
             .request(fields!["rcl_interfaces/msg/Parameter[] parameters"])
             .response(fields!["rcl_interfaces/msg/SetParametersResult[] results"])
-            .all_or_nothing(),
+            .null_is_absent(),
         /// The controller on or off.
         Enable = changes("/pid_controller/enable", "pendularm_interfaces/srv/Enable")
             .request(SWITCH)
@@ -108,7 +106,7 @@ table! {
         Solve = service("/ik/solve", "pendularm_interfaces/srv/Solve", Node::Ik)
             .request(fields!["float64 x  # m", "float64 y  # m", "float64 phi?  # rad"])
             .response(fields!["float64[] positions  # rad"])
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Drives the arm to an end effector position.
         SendGoal = service("/ik_action/send_goal", "pendularm_interfaces/srv/SendGoal", Node::IkAction)
             .request(fields![
@@ -119,16 +117,16 @@ table! {
                 "float64 success_hold?  # s",
             ])
             .response(fields!["string goal_id"])
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Preempts the active goal.
         CancelGoal = service("/ik_action/cancel_goal", "pendularm_interfaces/srv/CancelGoal", Node::IkAction)
             .request(fields!["string goal_id?"])
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Starts a new timed trial.
         TrialStart = service("/ik_trial/start", "pendularm_interfaces/srv/TrialStart", Node::IkTrial)
             .request(TRIAL)
             .response(TRIAL)
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Replaces the trial's present target by a new one.
         TrialSkip = service("/ik_trial/skip", "pendularm_interfaces/srv/TrialSkip", Node::IkTrial),
         /// Ends the trial.
@@ -144,7 +142,7 @@ table! {
                 "builtin_interfaces/msg/Duration timeout?  # s, ns",
             ])
             .response(fields!["string topic_name"])
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Predicts the largest stable timestep.
         Stability = service("/study/stability", "pendularm_interfaces/srv/Stability", Node::Study)
             .request(fields![
@@ -174,7 +172,7 @@ table! {
                 "float64 advised_duration  # s",
             ])
             .computation()
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Runs the arm offline.
         Rollout = service("/study/rollout", "pendularm_interfaces/srv/Rollout", Node::Study)
             .request(fields![
@@ -204,7 +202,7 @@ table! {
                 "float64 sampling_error_uncertainty  # rad",
             ])
             .computation()
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Finds gains that are stable in every pose and settle in time.
         SuggestGains = service("/study/gains", "pendularm_interfaces/srv/SuggestGains", Node::Study)
             .request(fields![
@@ -224,7 +222,7 @@ table! {
                 "float64 settled_after  # s",
             ])
             .computation()
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Finds the cheapest method and timestep for an allowed error at the end effector.
         Plan = service("/study/plan", "pendularm_interfaces/srv/Plan", Node::Study)
             .request(fields![
@@ -251,13 +249,13 @@ table! {
                 "float64[] errors  # m",
             ])
             .computation()
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Begins a record.
         RecorderStart if "record" =
             service("/recorder/start", "pendularm_interfaces/srv/RecorderStart", Node::Recorder)
             .request(fields!["string name?"])
             .response(fields!["string file"])
-            .all_or_nothing(),
+            .null_is_absent(),
         /// Ends the record.
         RecorderStop if "record" =
             service("/recorder/stop", "pendularm_interfaces/srv/RecorderStop", Node::Recorder)
@@ -298,10 +296,10 @@ impl Service {
         self.entry().is_computation
     }
 
-    /// Whether one bad field rejects the whole request. There, `null` in an optional field means absent.
+    /// Whether `null` in an optional field means absent.
     #[must_use]
-    pub const fn all_or_nothing(self) -> bool {
-        self.entry().is_all_or_nothing
+    pub const fn null_is_absent(self) -> bool {
+        self.entry().null_is_absent
     }
 
     /// Topics, in clients' spelling. No earlier message of them may follow the answer.

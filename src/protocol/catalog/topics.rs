@@ -55,7 +55,8 @@ table! {
             "string outcome",
             "pendularm_interfaces/msg/Target target  # m, rad",
             "float64 final_distance  # m",
-        ]),
+        ])
+            .supersedes(&["/ik_action/feedback", "ik_action/feedback"]),
         /// The timed trial, 10 Hz and at every change.
         TrialStatus = published("/ik_trial/status", Node::IkTrial, "pendularm_interfaces/msg/TrialStatus", fields![
             "bool running",
@@ -167,6 +168,12 @@ impl Topic {
     #[must_use]
     pub const fn is_latched(self) -> bool {
         self.entry().latched
+    }
+
+    /// Topics, in clients' spelling. No earlier message of them may follow a message of this topic.
+    #[must_use]
+    pub const fn supersedes(self) -> &'static [&'static str] {
+        self.entry().supersedes
     }
 
     /// The type of its messages.

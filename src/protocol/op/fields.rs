@@ -107,7 +107,7 @@ impl<'a> Fields<'a> {
 
     /// The fields of an empty request.
     fn of(service: Service) -> Self {
-        Self::with(service.fields(), service.all_or_nothing())
+        Self::with(service.fields(), service.null_is_absent())
     }
 
     fn with(fields: &'static [Field], null_is_absent: bool) -> Self {

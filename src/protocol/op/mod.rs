@@ -30,6 +30,8 @@ pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
 pub const MAX_QUEUE_LENGTH: usize = 100_000;
 /// Longest `timeout` of a forwarded call: a day.
 pub const MAX_TIMEOUT: Duration = Duration::from_secs(24 * 3600);
+/// The value that a name must have.
+const A_NAME: &str = "a non-empty string";
 /// Longest part of the JSON parser's message in an answer, in characters. It may quote the client.
 const MAX_PARSER_MESSAGE: usize = 160;
 
@@ -376,10 +378,10 @@ impl<'a> OpReader<'a> {
             .ok_or_else(|| Problem::UnknownOp(text::excerpt(&op)))
     }
 
-    /// A call. Once its service is known, every other fault gets a `service_response`.
+    /// A call. If its service is a text, every fault gets a `service_response`.
     fn call(&self) -> Result<Op, OpError> {
-        let service = self.name("service").map_err(OpError::Status)?;
-        match self.timeout() {
+        let service = self.spelling("service").map_err(OpError::Status)?;
+        match self.name("service").and_then(|_| self.timeout()) {
             Ok(timeout) => Ok(Op::CallService(CallService {
                 service,
                 args: self.args(),
@@ -559,11 +561,16 @@ impl<'a> OpReader<'a> {
 
     /// A topic or service name.
     fn name(&self, field: &'static str) -> Result<String, Problem> {
-        let name = self.typed(field, "a non-empty string", |raw| {
+        let name = self.typed(field, A_NAME, |raw| {
             json::text(raw).filter(|name| !name.is_empty())
         })?;
         self.short(field, &name)?;
         Ok(name.into_owned())
+    }
+
+    /// The text of a name, which may be empty or too long.
+    fn spelling(&self, field: &'static str) -> Result<String, Problem> {
+        self.typed(field, A_NAME, json::text).map(Cow::into_owned)
     }
 
     fn short(&self, field: &'static str, text: &str) -> Result<(), Problem> {
@@ -616,12 +623,15 @@ impl<'a> OpReader<'a> {
         args.map_or_else(Payload::empty_object, Payload::from)
     }
 
+    /// As in rosbridge, 0 or less means no timeout, which here is the longest one.
     fn timeout(&self) -> Result<Option<Duration>, Problem> {
-        let expected = "a number of seconds greater than 0";
-        let timeout = self.optional("timeout", expected, |raw| {
-            json::number(raw).filter(|timeout| timeout.is_finite() && *timeout > 0.0)
+        let timeout = self.optional("timeout", "a finite number of seconds", |raw| {
+            json::number(raw).filter(|timeout| timeout.is_finite())
         })?;
-        Ok(timeout.map(|timeout| duration(timeout, MAX_TIMEOUT)))
+        Ok(timeout.map(|timeout| match timeout > 0.0 {
+            true => duration(timeout, MAX_TIMEOUT),
+            false => MAX_TIMEOUT,
+        }))
     }
 }
 
@@ -633,16 +643,16 @@ fn duration(seconds: f64, longest: Duration) -> Duration {
 // ---- goals and cancellations, and the ops of clients that serve -----------------------------------------------------
 
 impl OpReader<'_> {
-    /// A goal. Once its action is known, every other fault gets an `action_result`.
+    /// A goal. If its action is a text, every fault gets an `action_result`.
     fn goal(&self) -> Result<Op, OpError> {
-        let action = self.name("action").map_err(OpError::Status)?;
-        match self.goal_for(&action) {
+        let action = self.spelling("action").map_err(OpError::Status)?;
+        match self.valid_goal() {
             Ok(goal) => Ok(Op::SendActionGoal(goal)),
             Err(problem) => Err(OpError::Goal { action, problem }),
         }
     }
 
-    fn goal_for(&self, action: &str) -> Result<ActionGoal, Problem> {
+    fn valid_goal(&self) -> Result<ActionGoal, Problem> {
         if let Some(id) = self.get("id") {
             self.short("id", id.get())?;
         }
@@ -653,7 +663,7 @@ impl OpReader<'_> {
                 Some(_) => self.boolean("feedback")?,
                 None => false,
             },
-            action: action.to_owned(),
+            action: self.name("action")?,
         })
     }
 
@@ -691,9 +701,10 @@ impl OpReader<'_> {
             _ => {
                 let is_good = self.boolean("result")?;
                 ProviderOp::End {
-                    // Here a failure may also have none.
+                    // Here they may be missing: a result without fields, or a failure without a reason.
                     values: match self.get("values") {
                         Some(_) if is_good => self.object("values")?,
+                        None if is_good => Payload::empty_object(),
                         values => Payload::from(values.unwrap_or(RawValue::NULL)),
                     },
                     status: self.goal_status(is_good)?,

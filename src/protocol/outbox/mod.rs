@@ -25,6 +25,7 @@ use bytes::{Buf, Bytes};
 use self::message::{QueuedMessage, by_itself, counted};
 pub use self::throttle::Throttle;
 use self::throttle::{HeldBack, TopicLimits};
+use crate::protocol::catalog::Topic;
 use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
 use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
 
@@ -90,9 +91,13 @@ impl Outbox {
     }
 
     /// Adds a message on a topic, or a series. It is queued, or held back if the topic is throttled. If it does
-    /// not fit, the oldest messages are dropped.
+    /// not fit, the oldest messages are dropped. Held messages that it outdates are discarded.
     pub fn push(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
         self.release(now);
+        if self.holds_back() {
+            let outdated = Topic::from_name(topic).map_or(&[][..], Topic::supersedes);
+            self.discard_held(outdated);
+        }
         if !self.may_fit(&frame) {
             return;
         }
@@ -129,9 +134,7 @@ impl Outbox {
 
     /// Adds a response or a status. Held messages of the topics in `supersedes` are outdated by it, and are discarded.
     pub fn push_response(&mut self, frame: Bytes, supersedes: &[&str]) {
-        for topic in supersedes {
-            self.take_held(topic);
-        }
+        self.discard_held(supersedes);
         self.response_bytes += frame.len();
         if frame.len() <= SHORT {
             self.short_bytes += frame.len();
@@ -398,6 +401,13 @@ impl Outbox {
                 limits.held.push_back(message);
             }
             limits.trim(&mut self.held);
+        }
+    }
+
+    /// Discards all that is held back of these topics.
+    fn discard_held(&mut self, topics: &[&str]) {
+        for topic in topics {
+            self.take_held(topic);
         }
     }
 

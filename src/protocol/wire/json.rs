@@ -307,36 +307,15 @@ impl<'a> Visitor<'a> for Members<'_, '_, 'a> {
     }
 
     fn visit_map<A: MapAccess<'a>>(self, mut map: A) -> Result<(), A::Error> {
-        while let Some(index) = map.next_key_seed(Name(self.names))? {
+        // A key that is not valid text is an unknown one.
+        while let Some(key) = map.next_key()?.map(text) {
             let value: &'a RawValue = map.next_value()?;
+            let index = key.and_then(|key| self.names.iter().position(|name| *name == key));
             if let Some(slot) = index.and_then(|index| self.values.get_mut(index)) {
                 *slot = Some(value);
             }
         }
         Ok(())
-    }
-}
-
-/// Reads a key as its index among the names; `None` for any other key.
-struct Name<'n>(&'n [&'n str]);
-
-impl<'a> DeserializeSeed<'a> for Name<'_> {
-    type Value = Option<usize>;
-
-    fn deserialize<D: Deserializer<'a>>(self, deserializer: D) -> Result<Option<usize>, D::Error> {
-        deserializer.deserialize_str(self)
-    }
-}
-
-impl Visitor<'_> for Name<'_> {
-    type Value = Option<usize>;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a key")
-    }
-
-    fn visit_str<E>(self, key: &str) -> Result<Option<usize>, E> {
-        Ok(self.0.iter().position(|name| *name == key))
     }
 }
 

@@ -332,8 +332,8 @@ impl World {
                 )?;
             }
             "call" | "refused" | "goal" | "error" => {
-                let (args, text) = (expand(args, &self.bound), expand(given, &self.bound));
-                ask(peer, verb, [service, &args, &text, wanted], &mut self.bound).await?;
+                let [name, args, text] = [service, args, given].map(|it| expand(it, &self.bound));
+                ask(peer, verb, [&name, &args, &text, wanted], &mut self.bound).await?;
             }
             "quiet" => {
                 let rest = peer.rest().await;

@@ -153,7 +153,7 @@ impl<const N: usize> Handler<SubscribeFrames<N>> for TfRepublisher<N> {
             && own.len() >= MAX_FRAME_SUBSCRIPTIONS
             && let Some((oldest, _)) = self.subscriptions.remove(oldest)
         {
-            oldest.end(GoalStatus::Aborted, TOO_MANY);
+            oldest.end(GoalStatus::Aborted, Some(TOO_MANY));
         }
         self.subscriptions.push_back((subscription, Instant::now()));
         self.keep_timer(ctx);
@@ -181,7 +181,7 @@ impl<const N: usize> Handler<CancelSent> for TfRepublisher<N> {
         let mut all = self.subscriptions.iter();
         let at = all.position(|(subscription, _)| is_meant(subscription));
         match at.and_then(|at| self.subscriptions.remove(at)) {
-            Some((subscription, _)) => subscription.end(GoalStatus::Canceled, Empty {}),
+            Some((subscription, _)) => subscription.end(GoalStatus::Canceled, None),
             None => cancel.refuse(NOT_KEPT),
         }
         self.keep_timer(ctx);
@@ -217,7 +217,7 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
 
     fn handle(&mut self, _: ShutDown, ctx: &mut Context<Self>) {
         for (subscription, _) in self.subscriptions.drain(..) {
-            subscription.end(GoalStatus::Aborted, Empty {});
+            subscription.end(GoalStatus::Aborted, None);
         }
         self.keep_timer(ctx);
     }
@@ -226,10 +226,14 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> SubscribeFrames<N> {
-    /// Informs a client with a goal of the action of its end.
-    fn end(&self, status: GoalStatus, values: impl Serialize) {
-        if let FrameReceiver::Client(client) = &self.by {
-            client.conclude(values, status);
+    /// Informs a client with a goal of the action of its end, and of the reason if it has no result.
+    fn end(&self, status: GoalStatus, why: Option<&str>) {
+        let FrameReceiver::Client(client) = &self.by else {
+            return;
+        };
+        match why {
+            Some(why) => client.fail(why, status),
+            None => client.conclude(Empty {}, status),
         }
     }
 
