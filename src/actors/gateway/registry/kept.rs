@@ -3,10 +3,13 @@
 //! **Invariant:** their sum is at most [`MAX_KEPT`] bytes. A dropped entry is subtracted.
 
 use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
+use std::sync::Arc;
 
 use super::refusal::Refusal;
 use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_KEPT};
+use crate::protocol::op::Served;
 
 /// The sum of one client's entries \[bytes\]. Clones share it.
 #[derive(Debug, Clone, Default)]
@@ -17,6 +20,15 @@ pub(super) struct Kept(Rc<Cell<usize>>);
 pub(super) struct KeptEntry {
     sum: Kept,
     bytes: usize,
+}
+
+/// The registrations of one client, sorted by name. They are withdrawn in that order.
+#[derive(Default)]
+pub(crate) struct Registrations {
+    pub(crate) advertised: BTreeMap<Box<str>, KeptEntry>,
+    /// Topics of its subscriptions, in its own spelling.
+    pub(crate) subscribed: BTreeSet<Arc<str>>,
+    pub(crate) served: BTreeMap<(Served, Box<str>), KeptEntry>,
 }
 
 impl Kept {

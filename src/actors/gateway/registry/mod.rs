@@ -1,7 +1,7 @@
 //! The registry has every client, topic and service. It fans messages out to subscribers, and routes calls.
 //!
-//! This file has its state and its handlers. `mailbox.rs` has its messages, `topics.rs` and `requests.rs` have the
-//! rosbridge ops, and the other files the tables.
+//! This file has its state and its handlers, then the table of topics and its messages. `topics.rs` and `requests.rs`
+//! have the rosbridge ops, and the other files the other tables.
 //!
 //! **Invariant:** a message is encoded once for any number of subscribers, and not at all without subscribers. A
 //! refused op changes nothing. It gets an error status, or the call's one response. Messages of one sender take effect
@@ -11,18 +11,17 @@ mod directory;
 mod forms;
 mod forwarded;
 mod kept;
-mod mailbox;
 mod places;
 mod refusal;
 mod requests;
-mod topic_table;
 mod topics;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
+use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 use std::fmt::Display;
 use std::net::IpAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -31,21 +30,19 @@ use tokio::time::Instant;
 
 use self::directory::Directory;
 use self::forwarded::Requests;
-use self::kept::{Kept, KeptEntry};
-pub use self::mailbox::{
-    Attach, Connect, CountRefusal, Disconnect, FinishAll, Handled, Outlets, RefuseCalls, Refused,
-    Request, Retire, SetTap, TakeCensus, Tap, Tapped, ToClient,
-};
+use self::kept::{Kept, KeptEntry, Registrations};
 use self::places::Places;
-use self::topic_table::Topics;
 use crate::actors::ConnectionId;
 pub use crate::actors::node::Nodes;
 use crate::actors::node::{Barrier, ClientLink, Done, FrameKind, Respond, guard};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::{Permit, cover};
+use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, ErrorForm, Level};
-use crate::protocol::op::{GoalStatus, Incoming, Op, OpError, Served, Verbosity};
+use crate::protocol::op::{Encoding, GoalStatus, Incoming, Op, OpError, Verbosity};
+use crate::protocol::outbox::Throttle;
+use crate::protocol::ros::rosapi::{Census, Listed};
 use crate::protocol::wire::json::Payload;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -100,15 +97,6 @@ struct Client {
     /// The guard that its calls to other clients share, and the receiver that ends with them. Removed when the client
     /// stops sending.
     calls: Option<(Done, oneshot::Receiver<()>)>,
-}
-
-/// The registrations of one client, sorted by name. They are withdrawn in that order.
-#[derive(Default)]
-struct Registrations {
-    advertised: BTreeMap<Box<str>, KeptEntry>,
-    /// Topics of its subscriptions, in its own spelling.
-    subscribed: BTreeSet<Arc<str>>,
-    served: BTreeMap<(Served, Box<str>), KeptEntry>,
 }
 
 /// The sender of the frame that is being performed, and the frame's `id`.
@@ -176,13 +164,11 @@ impl Client {
     }
 }
 
-// ---- life cycle -----------------------------------------------------------------------------------------------------
+// ---- handlers -------------------------------------------------------------------------------------------------------
 
 impl Actor for Registry {
     type Context = Context<Self>;
 }
-
-// ---- handlers -------------------------------------------------------------------------------------------------------
 
 impl Handler<Attach> for Registry {
     type Result = ();
@@ -228,24 +214,8 @@ impl Handler<CountRefusal> for Registry {
     type Result = ();
 
     fn handle(&mut self, _: CountRefusal, _: &mut Context<Self>) {
-        let Some(refused) = self.places.count_refusal(Instant::now()) else {
-            return;
-        };
-        let mut held: BTreeMap<IpAddr, usize> = BTreeMap::new();
-        for client in self.clients.values() {
-            *held.entry(client.from).or_default() += 1;
-        }
-        if let Some((most_from, held)) = held.into_iter().max_by_key(|(_, held)| *held) {
-            let (places, taken) = (self.places.clients, self.clients.len());
-            tracing::warn!(
-                places,
-                taken,
-                refused,
-                %most_from,
-                held,
-                "no place is free, so clients are refused; --clients sets the number of places"
-            );
-        }
+        let all = self.clients.values().map(|client| client.from);
+        self.places.warn_of_refusal(all, Instant::now());
     }
 }
 
@@ -417,4 +387,404 @@ impl Registry {
     fn covered(&self, frame: Bytes) -> Bytes {
         cover(self.permit.as_ref(), frame)
     }
+}
+
+// ---- the table of topics --------------------------------------------------------------------------------------------
+
+/// One `subscribe` of a connection to a topic. `id` distinguishes several of them.
+#[derive(Debug)]
+struct Subscription {
+    id: Option<Box<str>>,
+    throttle: Duration,
+    queue_length: usize,
+    encoding: Encoding,
+    /// Its part of the client's limit [`MAX_KEPT`](crate::actors::gateway::limits::MAX_KEPT).
+    entry: KeptEntry,
+}
+
+/// The topics, by their absolute names.
+#[derive(Default)]
+struct Topics {
+    by_name: BTreeMap<Arc<str>, TopicUsers>,
+}
+
+/// Clients that use a topic.
+#[derive(Default)]
+struct TopicUsers {
+    publishers: usize,
+    subscribers: Vec<Subscriber>,
+    /// The first type that a client named.
+    type_name: Option<Arc<str>>,
+    /// The first known type that a client named. Messages are encoded by it.
+    known: Option<Type>,
+}
+
+/// A connection that subscribes to a topic under one spelling.
+pub(super) struct Subscriber {
+    connection: ConnectionId,
+    /// Its spelling of the topic. Its messages have this name.
+    spelling: Arc<str>,
+    mailbox: Recipient<ToClient>,
+    /// The merged encoding of its subscriptions.
+    encoding: Encoding,
+    subscriptions: Vec<Subscription>,
+}
+
+impl Subscriber {
+    /// The subscription with this `id`.
+    fn subscription(&self, id: Option<&str>) -> Option<&Subscription> {
+        let mut all = self.subscriptions.iter();
+        all.find(|one| one.id.as_deref() == id)
+    }
+
+    /// Ends the subscriptions that `stays` rejects, and adds `new`, if there is one.
+    fn change(&mut self, stays: impl FnMut(&Subscription) -> bool, new: Option<Subscription>) {
+        self.subscriptions.retain(stays);
+        self.subscriptions.extend(new);
+        let all = self.subscriptions.iter().map(|one| one.encoding);
+        self.encoding = all.reduce(Encoding::merged).unwrap_or_default();
+    }
+
+    /// The smallest of each value over its subscriptions. `None` if there are none.
+    fn throttle(&self) -> Option<Throttle> {
+        let all = &self.subscriptions;
+        let queue_lengths = || all.iter().map(|one| one.queue_length);
+        Some(Throttle {
+            interval: all.iter().map(|one| one.throttle).min()?,
+            held_back: queue_lengths().min()?.max(1),
+            queue_length: queue_lengths().filter(|length| *length > 0).min(),
+        })
+    }
+
+    /// Sends the topic's throttle to the connection.
+    fn configure(&self, throttle: Option<Throttle>) {
+        self.mailbox.do_send(ToClient::Configure {
+            topic: Arc::clone(&self.spelling),
+            throttle,
+        });
+    }
+}
+
+impl Topics {
+    /// A client has begun to advertise a topic.
+    fn add_publisher(&mut self, topic: &str) {
+        self.by_name.entry(topic.into()).or_default().publishers += 1;
+    }
+
+    /// A client has begun to subscribe to a topic under a spelling.
+    fn add_subscriber(
+        &mut self,
+        topic: &str,
+        spelling: Arc<str>,
+        connection: ConnectionId,
+        mailbox: Recipient<ToClient>,
+    ) {
+        let users = self.by_name.entry(topic.into()).or_default();
+        users.subscribers.push(Subscriber {
+            connection,
+            spelling,
+            mailbox,
+            encoding: Encoding::default(),
+            subscriptions: Vec::new(),
+        });
+    }
+
+    /// A client that uses a topic has named its type. Returns whether it is the topic's first type.
+    fn note_type(&mut self, topic: &str, type_name: &str) -> bool {
+        let Some(users) = self.by_name.get_mut(topic) else {
+            return false;
+        };
+        if users.known.is_none() {
+            users.known = types::find(type_name);
+        }
+        let is_first = users.type_name.is_none();
+        users.type_name.get_or_insert_with(|| type_name.into());
+        is_first
+    }
+
+    /// A client has stopped advertising a topic.
+    fn remove_publisher(&mut self, topic: &str) {
+        self.remove(topic, |users| {
+            users.publishers = users.publishers.saturating_sub(1);
+        });
+    }
+
+    /// A client has stopped subscribing to a topic under this spelling.
+    fn remove_subscriber(&mut self, topic: &str, spelling: &str, client: ConnectionId) {
+        self.remove(topic, |users| {
+            users
+                .subscribers
+                .retain(|one| one.connection != client || *one.spelling != *spelling);
+        });
+    }
+
+    fn remove(&mut self, topic: &str, change: impl FnOnce(&mut TopicUsers)) {
+        let Some(users) = self.by_name.get_mut(topic) else {
+            debug_assert!(false, "{topic} was not counted");
+            return;
+        };
+        change(users);
+        if users.publishers == 0 && users.subscribers.is_empty() {
+            self.by_name.remove(topic);
+        }
+    }
+
+    /// The subscribers to a topic, under all its spellings.
+    fn subscribers(&self, topic: &str) -> &[Subscriber] {
+        let users = self.by_name.get(topic);
+        users.map_or(&[], |users| &users.subscribers)
+    }
+
+    /// The client that subscribes to a topic under this spelling.
+    fn subscriber(
+        &mut self,
+        topic: &str,
+        spelling: &str,
+        client: ConnectionId,
+    ) -> Option<&mut Subscriber> {
+        let mut all = self.by_name.get_mut(topic)?.subscribers.iter_mut();
+        all.find(|one| one.connection == client && *one.spelling == *spelling)
+    }
+
+    /// The type of a topic, if a client has named a known type.
+    fn known_type(&self, topic: &str) -> Option<Type> {
+        self.by_name.get(topic)?.known
+    }
+
+    /// The topics in the form of rosapi.
+    fn listed(&self) -> impl Iterator<Item = Listed> {
+        self.by_name.iter().map(|(name, users)| Listed {
+            name: Arc::clone(name),
+            type_name: users.type_name.clone(),
+            published: users.publishers > 0,
+            subscribed: !users.subscribers.is_empty(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_type_stays_with_a_topic_and_a_topic_with_its_last_user() {
+        let mut topics = Topics::default();
+        topics.add_publisher("/t");
+        topics.add_publisher("/t");
+        assert!(topics.note_type("/t", "a/b") && !topics.note_type("/t", "c/d"));
+        for _ in 0..2 {
+            let listed: Vec<Listed> = topics.listed().collect();
+            let one = Listed {
+                name: "/t".into(),
+                type_name: Some("a/b".into()),
+                published: true,
+                subscribed: false,
+            };
+            assert_eq!(listed, [one]);
+            topics.remove_publisher("/t");
+        }
+        assert_eq!(topics.listed().count(), 0);
+        assert!(!topics.note_type("/t", "a/b"));
+    }
+}
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// The runtime's nodes. From the runtime, once, before any client is accepted.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Attach(pub Nodes);
+
+/// A new client. From its connection. Returns its id.
+#[derive(Message)]
+#[rtype(result = "Result<ConnectionId, Refused>")]
+pub struct Connect {
+    /// The handles to its connection.
+    pub outlets: Outlets,
+    /// Its address.
+    pub from: IpAddr,
+    /// Whether it may use a kept place.
+    pub may_use_kept: bool,
+}
+
+/// A client was refused because no place was free. From its connection.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct CountRefusal;
+
+/// The handles to a connection, and the state that it shares with the registry.
+#[derive(Clone)]
+pub struct Outlets {
+    /// Its mailbox.
+    pub mailbox: Recipient<ToClient>,
+    /// Set when the client has disconnected. Heavy computations for it stop.
+    pub gone: Arc<AtomicBool>,
+    /// Bytes of responses that wait to be written. The connection updates the number.
+    pub backlog: Arc<AtomicUsize>,
+}
+
+/// Why a client was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Refused {
+    /// No place is free.
+    #[error(
+        "too many connections: this runtime serves {clients} clients at once and keeps {kept} of these places for HTTP \
+         and WebSocket; --clients sets the number"
+    )]
+    Full {
+        /// How many clients are served.
+        clients: usize,
+        /// How many of their places are kept.
+        kept: usize,
+    },
+    /// It has not sent the required token, and too many such clients wait.
+    #[error("this runtime requires its token first, and too many connections wait without a token")]
+    NoToken,
+    /// The runtime is ending.
+    #[error("shutting down")]
+    Closed,
+}
+
+/// The client has stopped sending. The registry withdraws its registrations. From its connection. The effect of
+/// [`Handled`] ends when the client's calls have been answered.
+#[derive(Message)]
+#[rtype(result = "Handled")]
+pub struct Retire(pub ConnectionId);
+
+/// The client has disconnected. The registry withdraws its registrations. From its connection. Idempotent.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Disconnect(pub ConnectionId);
+
+/// One frame of a client. From its connection, which waits for [`Handled`] before it continues to read.
+#[derive(Message)]
+#[rtype(result = "Handled")]
+pub struct Request {
+    /// The client.
+    pub from: ConnectionId,
+    /// The op with the frame's `id`, or the frame's error.
+    pub incoming: Incoming,
+    /// The memory permit of a long frame. All forms made of the frame share it.
+    pub permit: Option<Permit>,
+}
+
+/// The op has been routed. A node or the subscribers' sockets may still have to process it. The receiver ends after
+/// that.
+#[derive(MessageResponse, Default)]
+pub struct Handled {
+    effect: Option<oneshot::Receiver<()>>,
+    /// Messages sent to subscribers.
+    deliveries: usize,
+}
+
+impl Handled {
+    /// The op has already taken effect.
+    #[must_use]
+    pub fn at_once() -> Self {
+        Self::default()
+    }
+
+    /// The op was sent to its provider, or the message to its subscribers.
+    #[must_use]
+    pub fn with(effect: oneshot::Receiver<()>) -> Self {
+        Self {
+            effect: Some(effect),
+            deliveries: 0,
+        }
+    }
+
+    /// The message was also sent to this many subscribers.
+    #[must_use]
+    pub fn delivered(self, deliveries: usize) -> Self {
+        Self { deliveries, ..self }
+    }
+
+    /// Waits until the op has taken effect. Returns how many messages were sent to subscribers.
+    pub async fn effect(self) -> usize {
+        if let Some(effect) = self.effect {
+            // The sender never sends: dropping it is the signal.
+            let _ = effect.await;
+        }
+        self.deliveries
+    }
+}
+
+/// Requests the topics and services of the clients. From `rosapi`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "Census")]
+pub struct TakeCensus;
+
+/// A message or call in the registry, as the tap gets it.
+pub enum Tapped<'a> {
+    /// A message on a topic of the runtime, from a node or a client, as the whole `publish` frame.
+    Published(Topic, &'a Bytes),
+    /// A client's call of one of the runtime's services.
+    Called {
+        /// The client.
+        from: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The caller's `id`, if there is one.
+        id: Option<&'a Payload>,
+        /// The arguments.
+        args: &'a Payload,
+    },
+    /// The response to such a call, as the whole frame.
+    Answered {
+        /// The client.
+        to: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The frame.
+        frame: &'a Bytes,
+    },
+}
+
+/// Gets every message and call of the runtime, on the registry's thread. It must not block.
+pub type Tap = Box<dyn FnMut(Tapped<'_>) + Send>;
+
+/// Sets or removes the tap. While a tap is set, every topic of the runtime counts as subscribed. From the recorder.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct SetTap(pub Option<Tap>);
+
+/// The registry rejects new calls, and the calls and goals that wait for clients, with this reason. From the runtime,
+/// when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct RefuseCalls(pub &'static str);
+
+/// Every connection sends its queue and ends. From the runtime, when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct FinishAll;
+
+/// The registry's messages to a connection, in one order.
+#[derive(Message, Clone)]
+#[rtype(result = "()")]
+pub enum ToClient {
+    /// A topic message, or a [series](crate::protocol::wire::series) of them. It may be dropped, oldest first, when the
+    /// client is slow.
+    Deliver {
+        /// The topic, for throttling. `None` for feedback of a goal.
+        topic: Option<Arc<str>>,
+        /// The message, shared by all subscribers of this form.
+        frame: Bytes,
+    },
+    /// A response, a status, or a call forwarded to this client as a provider. It is never dropped.
+    Respond {
+        /// The whole frame.
+        frame: Bytes,
+        /// The service that responds, if it is the runtime's own.
+        service: Option<Service>,
+    },
+    /// How a topic is throttled for this client.
+    Configure {
+        /// The topic.
+        topic: Arc<str>,
+        /// The smallest values of all subscriptions. `None` once it is not subscribed.
+        throttle: Option<Throttle>,
+    },
+    /// Send the queue, then end. The runtime is ending.
+    Finish,
 }

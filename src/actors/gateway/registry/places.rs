@@ -2,6 +2,8 @@
 //!
 //! **Invariant:** a client with a place keeps it until it disconnects.
 
+use std::collections::BTreeMap;
+use std::net::IpAddr;
 use std::time::Duration;
 
 use tokio::time::Instant;
@@ -48,7 +50,7 @@ impl Places {
     }
 
     /// Counts a refusal. Returns the number of refusals since the last warning, if the next warning is due.
-    pub(super) fn count_refusal(&mut self, now: Instant) -> Option<u64> {
+    fn count_refusal(&mut self, now: Instant) -> Option<u64> {
         self.refused += 1;
         if self
             .warned
@@ -58,6 +60,28 @@ impl Places {
         }
         self.warned = Some(now);
         Some(std::mem::take(&mut self.refused))
+    }
+
+    /// Counts a refusal and, if the next warning is due, logs it with the address that most of the clients have.
+    pub(super) fn warn_of_refusal(&mut self, all: impl Iterator<Item = IpAddr>, now: Instant) {
+        let Some(refused) = self.count_refusal(now) else {
+            return;
+        };
+        let mut held: BTreeMap<IpAddr, usize> = BTreeMap::new();
+        for from in all {
+            *held.entry(from).or_default() += 1;
+        }
+        let taken: usize = held.values().sum();
+        if let Some((most_from, held)) = held.into_iter().max_by_key(|(_, held)| *held) {
+            tracing::warn!(
+                places = self.clients,
+                taken,
+                refused,
+                %most_from,
+                held,
+                "no place is free, so clients are refused; --clients sets the number of places"
+            );
+        }
     }
 }
 

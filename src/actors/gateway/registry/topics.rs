@@ -11,8 +11,7 @@ use bytes::Bytes;
 
 use super::forms::{Made, ToEncode};
 use super::refusal::Refusal;
-use super::topic_table::{Subscriber, Subscription};
-use super::{FrameOrigin, Handled, Registry, SetTap, Tapped, ToClient};
+use super::{FrameOrigin, Handled, Registry, SetTap, Subscriber, Subscription, Tapped, ToClient};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::MAX_LONG_FORMS;
 use crate::actors::node::{Done, Interest, Publish, TopicMessage, guard};
