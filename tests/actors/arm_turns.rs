@@ -219,14 +219,11 @@ fn progress_of_a_goal_is_sent_step_by_step_however_many_clients_step_the_arm() {
         let (log, barriers) = (Rc::clone(&received), Rc::clone(&before));
         let publisher = stand_in(move |_: Barrier| barriers.borrow_mut().push(log.borrow().len()));
         let (study, goal_reporters) = (None, vec![publisher]);
-        bench
-            .arm
-            .send(AttachNodes {
-                study,
-                goal_reporters,
-            })
-            .await
-            .unwrap();
+        let nodes = AttachNodes {
+            study,
+            goal_reporters,
+        };
+        bench.arm.send(nodes).await.unwrap();
         bench.ask(of_timestep(1.0));
         bench.ask(SetParams {
             gravity: Some(0.0),

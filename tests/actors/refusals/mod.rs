@@ -221,11 +221,8 @@ fn every_answer_has_the_fields_of_its_row_in_the_catalogue() {
             if matches!(service, Service::Rosapi(_)) || name.starts_with("/recorder") {
                 continue;
             }
-            let takes_duration = service
-                .fields()
-                .iter()
-                .any(|field| field.name == "duration");
-            let short = takes_duration.then_some(("duration", "0.1"));
+            let is_run = service.fields().iter().any(|one| one.name == "duration");
+            let short = is_run.then_some(("duration", "0.1"));
             let answer = call(&mut client, name, &request(name, short.as_slice())).await;
             assert_eq!(answer["result"], true, "{answer}");
             let written = answer["values"].as_object().unwrap().keys();

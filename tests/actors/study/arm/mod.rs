@@ -47,14 +47,11 @@ impl Consulting {
         });
         let study = Some(study);
         let goal_reporters = Vec::new();
-        stage
-            .arm
-            .send(AttachNodes {
-                study,
-                goal_reporters,
-            })
-            .await
-            .unwrap();
+        let nodes = AttachNodes {
+            study,
+            goal_reporters,
+        };
+        stage.arm.send(nodes).await.unwrap();
         Self {
             client: stage.connect(),
             stage,
