@@ -276,7 +276,7 @@ impl<const N: usize> Rollout<N> {
 /// Longest step of Runge-Kutta 4 in an ideal loop \[s\]. The error is then some 1e-12 rad for the default arms.
 const LONGEST_STEP: f64 = 2.5e-4;
 
-/// Most of its steps per step of the run. With longer steps of the run the error is reported as unknown.
+/// Most of its steps per step of the run. If those are long, its own are longer, which their uncertainty shows.
 const MOST_STEPS: u64 = 256;
 
 /// The loop with a continuous-time law. Its timestep divides that of the run.
