@@ -35,8 +35,8 @@ export function read({ method, timestep }, values, seconds) {
   };
 }
 
-/** The runtime gives no error below this many times its uncertainty. */
-const CLEAR = 4;
+/** An error below four times its uncertainty is not given. With the uncertainty, and a digit rounded down, it is below this many. */
+const CLEAR = 8;
 /** With a larger uncertainty the reference could not follow the motion [rad]. */
 const FOLLOWED = 1e-3;
 

@@ -242,7 +242,10 @@ export function whyText(/** @type {any} */ state) {
   const limit = limits[method];
   if (!acts(state)) return whyFree(answer, method, limit);
   if (limit === Infinity) return "";
-  return limit === 0 ? `Why: ${cause(answer, limit)}` : `Why ${duration(limit)}: ${cause(answer, limit)} ${others(limits)}`;
+  if (limit === 0) return `Why: ${cause(answer, limit)}`;
+  const least = answer.minimum_over_poses_held;
+  const explained = answer.critical && least > 0 && least < NEARLY * limit ? `${duration(least)}, the smallest limit of all poses` : duration(limit);
+  return `Why ${explained}: ${cause(answer, limit)} ${others(limits)}`;
 }
 
 /** @param {any} answer @param {string} method @param {number} limit */

@@ -76,9 +76,9 @@ pub struct GainsRequirements {
 pub struct SuggestedGains<const N: usize> {
     /// The gains.
     pub gains: Gains<N>,
-    /// The smallest timestep limit over all poses \[s\]; `None` if there is no limit.
+    /// The smallest timestep limit over all poses \[s\], or its bound if not `certified`; `None` if there is no limit.
     pub limit: Option<f64>,
-    /// Whether a lower bound is within 1 % of it.
+    /// Whether limit and bound agree to 1 %.
     pub certified: bool,
     /// The longest settling time of the moves \[s\].
     pub settled_after: f64,

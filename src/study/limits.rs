@@ -83,7 +83,7 @@ pub struct Limits<const N: usize> {
     pub bound: Option<f64>,
     /// Whether `bound` is proven without an estimate: with Euler, and without gravity.
     pub bound_is_proven: bool,
-    /// Whether `minimum_held` and `bound` agree to 1 %.
+    /// Whether `minimum_held` and `bound` agree to 1 %. The smallest limit may then be up to 1 % below `minimum_held`.
     pub certified: bool,
     /// The pose of `minimum_held` \[rad\]; `None` where nothing limits.
     pub worst_pose: Option<[f64; N]>,

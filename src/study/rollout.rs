@@ -118,7 +118,7 @@ pub struct Deviation {
     pub samples: usize,
     /// Largest error of a joint position \[rad\].
     pub error: f64,
-    /// Uncertainty of the errors \[rad\]: the distance between the references, at least one unit in the last place.
+    /// Uncertainty of the errors \[rad\], at least one unit in the last place.
     pub uncertainty: f64,
 }
 
@@ -132,7 +132,7 @@ const SPREAD: f64 = 3.0;
 const ABOVE_UNCERTAINTY: f64 = 4.0;
 
 impl Deviation {
-    /// The largest error \[rad\]; `None` if it is not clearly larger than the distance between the references.
+    /// The largest error \[rad\]; `None` if it is not clearly larger than its uncertainty.
     pub fn known(&self) -> Option<f64> {
         (self.error >= ABOVE_UNCERTAINTY * self.uncertainty).then_some(self.error)
     }
@@ -276,7 +276,7 @@ impl<const N: usize> Rollout<N> {
 /// Longest step of Runge-Kutta 4 in an ideal loop \[s\]. The error is then some 1e-12 rad for the default arms.
 const LONGEST_STEP: f64 = 2.5e-4;
 
-/// Most of its steps per step of the run. With longer steps of the run the error is reported as unknown.
+/// Most of its steps per step of the run. If those are long, its own are longer, which their uncertainty shows.
 const MOST_STEPS: u64 = 256;
 
 /// The loop with a continuous-time law. Its timestep divides that of the run.

@@ -209,12 +209,17 @@ impl<'a> Stepping<'a> {
         rows(&second, &a.clone().plus(0.5 * h, &a.product(&predicted)))
     }
 
-    /// `((I + h E)^m - I) / (m h)` for the `m` substeps of a period.
+    /// `((I + h E)^m - I) / (m h)` for the `m` substeps of a period, by repeated squaring.
     fn repeated(&self, step: &Matrix, h: f64) -> Matrix {
         let mut sum = step.clone();
-        for _ in 1..self.substeps {
-            let product = step.product(&sum);
-            sum = sum.plus(1.0, step).plus(h, &product);
+        // Each binary digit of `m` after the first doubles the number of steps, and a 1 adds one.
+        for digit in (0..self.substeps.ilog2()).rev() {
+            let square = sum.product(&sum);
+            sum = sum.scaled(2.0).plus(h, &square);
+            if self.substeps >> digit & 1 == 1 {
+                let product = step.product(&sum);
+                sum = sum.plus(1.0, step).plus(h, &product);
+            }
         }
         sum.scaled(1.0 / f64::from(self.substeps))
     }
@@ -276,13 +281,12 @@ impl<'a> Stepping<'a> {
     }
 
     fn boundary(&self, stable: f64, unstable: f64) -> f64 {
-        // 60 halvings of the logarithm reduce a thousandfold interval to a relative width of 1e-14.
         bisect((stable, unstable), 60, |period| self.is_stable(period))
     }
 }
 
 /// The boundary between a value for which a condition holds and a larger one for which it does not. The search ends at
-/// a few units of rounding, or after the given number of halvings of the logarithm.
+/// a relative width of 1e-13, or after the given number of halvings of the logarithm.
 pub(crate) fn bisect(
     (mut holding, mut failing): (f64, f64),
     halvings: u32,

@@ -195,6 +195,7 @@ test("a deviation that flips at every step is named with its joint and its growt
   const text = why(SERVED, ALIKE);
   assert.match(text, /^Why 4\.32 ms: joint 2 is the fastest\. A torque that is held longer overshoots: .* flips at every step and grows by 21 %/);
   assert.match(text, /A better method does not help/);
+  assert.match(why({ ...SERVED, minimum_over_poses_held: 0.002 }, ALIKE), /^Why 2 ms, the smallest limit of all poses: a swing of joint 2/);
 });
 
 test("a swing is named by its frequency, and methods with a longer limit by their names", () => {

@@ -14,14 +14,14 @@ use pendularm::study::stability::{limit_held, limits};
 use crate::properties::advised;
 use crate::stored::gains;
 
-/// Whether the energy above that of the hanging arm trebles within `duration`, or the numbers end.
+/// Whether the energy above that of the hanging arm doubles within `duration`, or the numbers end.
 fn is_lost<const N: usize>(free: &ControlLoop<N>, state: &State<N>, duration: f64) -> bool {
     let (arm, timestep) = (&free.arm, free.timestep);
     let mut hanging = [0.0; N];
     hanging[0] = -FRAC_PI_2;
     let lowest = potential_energy(arm, &hanging);
     let mut live = free.simulation(*state);
-    let most = 3.0 * (energy(arm, state) - lowest);
+    let most = 2.0 * (energy(arm, state) - lowest);
     let steps = (duration / timestep).ceil() as u64;
     // Not finite is not at most anything.
     (0..steps).any(|_| !(live.step() && energy(arm, live.state()) - lowest <= most))

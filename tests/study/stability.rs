@@ -128,10 +128,6 @@ fn the_advised_timestep_is_a_part_of_the_smallest_over_poses() {
         assert!(minimum <= held);
         assert!(limits.minimum_continuous <= limits.continuous);
         assert_eq!(limits.advised, Some(0.8 * minimum));
-        let alone = limit_held(&control);
-        assert_eq!(alone, limits.held);
-        // The default gains are chosen to be stable up to 3 ms in every pose.
-        assert!(minimum > 0.003);
     }
 }
 

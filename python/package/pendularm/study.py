@@ -78,7 +78,7 @@ class Stability:
     """0.8 of the smaller of that and the minimum over poses. If the minimum is 0, the advice is only for this
     setpoint. `None` also for a control period longer than the advice."""
     advised_duration: float | None
-    """Time in which a free arm's energy stays within a factor of two at that timestep [s]; `None` under control."""
+    """Time in which a free arm's energy hardly ever doubles at that timestep [s]; `None` under control."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class Rollout:
     """Largest distance of a joint from the reference [rad]; `None` without a reference, or if the uncertainty is too
     large."""
     error_uncertainty: float | None
-    """Largest distance of two references from each other [rad]."""
+    """Three times the largest distance of two of four references from each other, at least one last digit [rad]."""
     sampling_error: float | None
     """Largest distance of a joint from a loop whose law acts at every instant [rad]; `None` as for `error`."""
     sampling_error_uncertainty: float | None
@@ -145,9 +145,10 @@ class SuggestedGains:
     kd: Floats
     """[N m s/rad], (links,)."""
     timestep_limit: float | None
-    """The smallest timestep limit over all poses [s]; `None` if nothing limits."""
+    """The smallest timestep limit over all poses [s], or its lower bound if they differ by more than 1 %; `None` if
+    nothing limits."""
     certified: bool
-    """Whether a lower bound is within 1 % of it."""
+    """Whether they differ by less."""
     margin: float | None
     """This limit divided by the timestep."""
     settled_after: float
