@@ -256,29 +256,36 @@ where
 }
 
 #[test]
-fn every_answer_of_an_arm_of_two_links_is_the_same() {
+fn every_answer_of_an_arm_of_two_or_three_links_is_the_same() {
     in_virtual_time(every_answer_is_the_same::<2>());
+    in_virtual_time(every_answer_is_the_same::<3>());
 }
 
-#[test]
-fn every_answer_of_an_arm_of_three_links_is_the_same() {
-    in_virtual_time(every_answer_is_the_same::<3>());
+/// Both, subscribed to topics, after calls. After each call time passes \[ms\].
+async fn after(topics: &[&str], calls: Vec<(&str, Value, u64)>) -> Both<2> {
+    let mut both = Both::<2>::start().await;
+    for topic in topics {
+        both.subscribe(topic).await;
+    }
+    for (service, args, time) in calls {
+        both.agree(service, args).await;
+        both.pass(ms(time)).await;
+    }
+    both.client.settle().await;
+    both
 }
 
 #[test]
 fn a_goal_and_its_messages_are_the_same() {
     in_virtual_time(async {
-        let mut both = Both::<2>::start().await;
-        for topic in [
+        let topics = [
             "/joint_states",
             "/joint_trajectory",
             "/ik_action/feedback",
             "/ik_action/result",
-        ] {
-            both.subscribe(topic).await;
-        }
+        ];
         // Another goal takes the first one's place, the third is cancelled, and a reset ends the fourth.
-        for (service, args, time) in [
+        let calls = vec![
             ("/ik_action/send_goal", json!({"x": 0.7, "y": 0.9}), 0),
             ("/pid_controller/enable", json!({"data": true}), 900),
             ("/ik_action/send_goal", json!({"x": -0.7, "y": 1.1}), 6000),
@@ -288,11 +295,8 @@ fn a_goal_and_its_messages_are_the_same() {
             ("/arm_sim/reset", json!({}), 0),
             ("/arm_sim/pause", json!({"data": true}), 0),
             ("/arm_sim/step", json!({"steps": 1500}), 100),
-        ] {
-            both.agree(service, args).await;
-            both.pass(ms(time)).await;
-        }
-        both.client.settle().await;
+        ];
+        let mut both = after(&topics, calls).await;
         assert_eq!(both.agree_on("/ik_action/result"), 4);
         assert_eq!(both.agree_on("/joint_trajectory"), 4);
         assert!(both.agree_on("/ik_action/feedback") > 100);
@@ -303,20 +307,14 @@ fn a_goal_and_its_messages_are_the_same() {
 #[test]
 fn a_trial_has_the_same_targets_and_the_same_end() {
     in_virtual_time(async {
-        let mut both = Both::<2>::start().await;
-        both.subscribe("/ik_action/result").await;
-        both.subscribe("/joint_trajectory").await;
         let terms = json!({"duration": 20.0, "epsilon": 0.05, "success_hold": 0.2});
-        for (service, args, time) in [
+        let calls = vec![
             ("/pid_controller/enable", json!({"data": true}), 0),
             ("/ik_trial/start", terms, 9000),
             ("/ik_trial/skip", json!({}), 12_000),
             ("/ik_trial/stop", json!({}), 0),
-        ] {
-            both.agree(service, args).await;
-            both.pass(ms(time)).await;
-        }
-        both.client.settle().await;
+        ];
+        let mut both = after(&["/ik_action/result", "/joint_trajectory"], calls).await;
         assert!(both.agree_on("/ik_action/result") > 3);
         assert!(both.agree_on("/joint_trajectory") > 3);
     });
