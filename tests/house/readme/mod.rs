@@ -1,16 +1,17 @@
 //! The documents agree with the sources: the tables of README and docs/ against the Makefile, the manifest and the
-//! catalog. This file checks README itself.
+//! catalog. This file has the options, the page's methods and the kept report.
 //!
 //! **Invariant:** each check reads both sides, so that neither can change alone.
 
 mod architecture;
 mod make;
 mod manifest;
-mod page;
 mod protocol;
-mod report;
 
 use std::process::Command;
+
+use pendularm::math::integrator::Method;
+use serde_json::Value;
 
 use crate::papers::{table, text};
 
@@ -31,12 +32,6 @@ fn printed(command: &mut Command) -> String {
 }
 
 #[test]
-fn the_readme_is_read_in_one_sitting() {
-    let length = text("README.md").len();
-    assert!(length <= 7_000, "README.md has {length} bytes");
-}
-
-#[test]
 fn the_papers_list_every_option_of_the_help_with_its_variable_and_default() {
     let help = printed(Command::new(env!("CARGO_BIN_EXE_pendularm")).arg("--help"));
     let rows = table(&text("docs/command-line.md"), "option");
@@ -53,4 +48,36 @@ fn the_papers_list_every_option_of_the_help_with_its_variable_and_default() {
         assert!(line.ends_with(&expected), "{line}");
     }
     assert_eq!(help.matches("[env: ").count(), rows.len());
+}
+
+/// Each method with its order, if it is a Runge-Kutta method with as many evaluations.
+#[test]
+fn the_page_has_every_method_in_its_order() {
+    let script = text("page/format.js");
+    let mut lines = script.lines();
+    let line = lines.find_map(|line| line.strip_prefix("export const METHODS = "));
+    let line = line.unwrap().trim_end_matches(';');
+    let rows: Vec<Vec<Value>> = serde_json::from_str(line).unwrap();
+    let order = |row: &[Value]| row.get(2).map(|order| order.as_u64().unwrap());
+    let rows = rows.iter();
+    let named: Vec<_> = rows
+        .map(|row| (row[0].as_str().unwrap(), order(row)))
+        .collect();
+    let expected = Method::ALL.map(|method| {
+        let order = (method != Method::Verlet).then(|| u64::from(method.order()));
+        (method.name(), order)
+    });
+    assert_eq!(named, expected);
+}
+
+#[test]
+fn the_papers_agree_with_the_kept_report() {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/keep-report.py");
+    let check = Command::new("python3").args([script, "--check"]).output();
+    let Ok(check) = check else {
+        assert!(std::env::var_os("CI").is_none(), "python3 is missing");
+        return;
+    };
+    let said = String::from_utf8_lossy(&check.stderr);
+    assert!(check.status.success(), "{said}");
 }
