@@ -48,8 +48,15 @@ pub(super) struct Transport<S> {
 
 enum Protocol {
     Plain(FrameReader),
-    WebSocket(Box<WebSocket>),
+    WebSocket(Box<WebSocket>, Web),
 }
+
+/// Only an HTTP request opens a WebSocket. In a program without HTTP this has no value, so the compiler leaves the code of
+/// WebSockets out.
+#[cfg(feature = "web")]
+struct Web;
+#[cfg(not(feature = "web"))]
+enum Web {}
 
 impl<S: ClientStream> Transport<S> {
     /// A stream of lines.
@@ -59,14 +66,15 @@ impl<S: ClientStream> Transport<S> {
     }
 
     /// A stream after the handshake of a WebSocket.
+    #[cfg(feature = "web")]
     pub(super) fn socket(stream: S) -> Self {
-        let protocol = Protocol::WebSocket(Box::new(WebSocket::new()));
+        let protocol = Protocol::WebSocket(Box::new(WebSocket::new()), Web);
         Self { stream, protocol }
     }
 
     /// Whether its frames are messages, which may be binary. The peer then answers the end of the connection.
     pub(super) const fn is_socket(&self) -> bool {
-        matches!(self.protocol, Protocol::WebSocket(_))
+        matches!(self.protocol, Protocol::WebSocket(..))
     }
 
     // ---- receiving --------------------------------------------------------------------------------------------------
@@ -81,7 +89,7 @@ impl<S: ClientStream> Transport<S> {
         let read = ready!(pin!(read_some(&mut self.stream, chunk)).poll(cx));
         Poll::Ready(match (read, &mut self.protocol) {
             (Err(_), _) => Err(ClientLost::Gone),
-            (Ok(0), Protocol::WebSocket(socket)) => Err(socket.violated()),
+            (Ok(0), Protocol::WebSocket(socket, _)) => Err(socket.violated()),
             (Ok(bytes), _) => Ok(bytes),
         })
     }
@@ -90,7 +98,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn push(&mut self, chunk: &[u8]) {
         match &mut self.protocol {
             Protocol::Plain(frames) => frames.push(chunk),
-            Protocol::WebSocket(socket) => socket.messages.push(chunk),
+            Protocol::WebSocket(socket, _) => socket.messages.push(chunk),
         }
     }
 
@@ -98,7 +106,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn cut(&mut self) -> Result<Option<FramePart>, ClientLost> {
         match &mut self.protocol {
             Protocol::Plain(frames) => Ok(frames.cut()),
-            Protocol::WebSocket(socket) => match socket.messages.cut() {
+            Protocol::WebSocket(socket, _) => match socket.messages.cut() {
                 Some(part) => Ok(Some(part)),
                 None => socket.check_end().map(|()| None),
             },
@@ -108,7 +116,7 @@ impl<S: ClientStream> Transport<S> {
     /// Reads pings and a close in `chunk`, which follow messages that wait. Returns an error if the client has ended.
     /// Lines stay in `chunk`.
     pub(super) fn look_ahead(&mut self, chunk: &mut BytesMut) -> Result<(), ClientLost> {
-        let Protocol::WebSocket(socket) = &mut self.protocol else {
+        let Protocol::WebSocket(socket, _) = &mut self.protocol else {
             return Ok(());
         };
         socket.messages.push(chunk);
@@ -121,7 +129,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn taken_ahead(&self) -> usize {
         match &self.protocol {
             Protocol::Plain(_) => 0,
-            Protocol::WebSocket(socket) => socket.messages.waiting(),
+            Protocol::WebSocket(socket, _) => socket.messages.waiting(),
         }
     }
 
@@ -129,7 +137,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn is_unfinished(&self) -> bool {
         match &self.protocol {
             Protocol::Plain(frames) => frames.is_unfinished(),
-            Protocol::WebSocket(socket) => socket.messages.is_unfinished(),
+            Protocol::WebSocket(socket, _) => socket.messages.is_unfinished(),
         }
     }
 
@@ -137,7 +145,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn is_long_coming(&self) -> bool {
         let buffered = match &self.protocol {
             Protocol::Plain(frames) => frames.buffered(),
-            Protocol::WebSocket(socket) => socket.messages.buffered(),
+            Protocol::WebSocket(socket, _) => socket.messages.buffered(),
         };
         buffered > MEDIUM && self.is_unfinished()
     }
@@ -146,7 +154,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn finish(&mut self) -> Option<FrameError> {
         match &mut self.protocol {
             Protocol::Plain(frames) => frames.finish(),
-            Protocol::WebSocket(_) => None,
+            Protocol::WebSocket(..) => None,
         }
     }
 
@@ -154,7 +162,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn give_up(&mut self, why: &'static str) -> Result<(), ClientLost> {
         match &mut self.protocol {
             Protocol::Plain(_) => Ok(()),
-            Protocol::WebSocket(socket) => Err(socket.refuse(POLICY_VIOLATION, why)),
+            Protocol::WebSocket(socket, _) => Err(socket.refuse(POLICY_VIOLATION, why)),
         }
     }
 
@@ -170,7 +178,7 @@ impl<S: ClientStream> Transport<S> {
         let stream = &mut self.stream;
         match &mut self.protocol {
             Protocol::Plain(_) => write_some(stream, cx, frames),
-            Protocol::WebSocket(socket) => socket.poll_write(stream, cx, frames),
+            Protocol::WebSocket(socket, _) => socket.poll_write(stream, cx, frames),
         }
     }
 
@@ -178,7 +186,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         match &mut self.protocol {
             Protocol::Plain(_) => Poll::Ready(Ok(())),
-            Protocol::WebSocket(socket) => socket.poll_flush(&mut self.stream, cx),
+            Protocol::WebSocket(socket, _) => socket.poll_flush(&mut self.stream, cx),
         }
     }
 
@@ -186,7 +194,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn last_taken(&self) -> Option<Instant> {
         match &self.protocol {
             Protocol::Plain(_) => None,
-            Protocol::WebSocket(socket) => Some(socket.taken),
+            Protocol::WebSocket(socket, _) => Some(socket.taken),
         }
     }
 
@@ -197,7 +205,7 @@ impl<S: ClientStream> Transport<S> {
         cx: &mut Context<'_>,
         is_refused: bool,
     ) -> Poll<io::Result<()>> {
-        if let Protocol::WebSocket(socket) = &mut self.protocol {
+        if let Protocol::WebSocket(socket, _) = &mut self.protocol {
             ready!(socket.poll_close(&mut self.stream, cx))?;
             if !is_refused {
                 return Poll::Ready(Ok(()));
