@@ -51,8 +51,8 @@ enum Protocol {
     WebSocket(Box<WebSocket>, Web),
 }
 
-/// Only an HTTP request opens a WebSocket. In a program without HTTP this has no value, so the compiler leaves the code of
-/// WebSockets out.
+/// Only an HTTP request opens a WebSocket. In a program without HTTP this has no value, so the compiler omits the code of
+/// the protocol.
 #[cfg(feature = "web")]
 struct Web;
 #[cfg(not(feature = "web"))]
