@@ -296,7 +296,7 @@ fn a_goal_and_its_messages_are_the_same() {
             ("/arm_sim/pause", json!({"data": true}), 0),
             ("/arm_sim/step", json!({"steps": 1500}), 100),
         ];
-        let mut both = after(&topics, calls).await;
+        let both = after(&topics, calls).await;
         assert_eq!(both.agree_on("/ik_action/result"), 4);
         assert_eq!(both.agree_on("/joint_trajectory"), 4);
         assert!(both.agree_on("/ik_action/feedback") > 100);
@@ -314,7 +314,7 @@ fn a_trial_has_the_same_targets_and_the_same_end() {
             ("/ik_trial/skip", json!({}), 12_000),
             ("/ik_trial/stop", json!({}), 0),
         ];
-        let mut both = after(&["/ik_action/result", "/joint_trajectory"], calls).await;
+        let both = after(&["/ik_action/result", "/joint_trajectory"], calls).await;
         assert!(both.agree_on("/ik_action/result") > 3);
         assert!(both.agree_on("/joint_trajectory") > 3);
     });
