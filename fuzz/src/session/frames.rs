@@ -146,7 +146,8 @@ impl Session {
             Cast::Stub => timeout,
             Cast::Arm => Some(timeout.unwrap_or_default() % ARM_WAIT),
         };
-        let seconds = timeout.map(|ms| f64::from(ms) / 1000.0);
+        // 0 would mean none, and a call of a silent provider would wait for a day.
+        let seconds = timeout.map(|ms| f64::from(ms.max(1)) / 1000.0);
         put(&mut frame, "timeout", seconds.as_ref());
         let args = match args {
             Payload::Fitting(numbers, more) => Some(fitting(service_name(service), numbers, *more)),
