@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs the browser tests against the binary that `PENDULARM` names: `python3 tests/browser/run.py [-k part of a name]`.
 
-Most of a test's time is waiting for an arm that moves as fast as a real one, so three files run at a time, each with its own browser.
+Most of a test's time is waiting for an arm that moves as fast as a real one, so two files run at a time, each with its own browser.
 """
 
 import concurrent.futures
@@ -13,7 +13,7 @@ import sys
 import unittest
 
 FOLDER = pathlib.Path(__file__).parent
-AT_A_TIME = 3
+AT_A_TIME = 2
 
 
 def run(path):
