@@ -387,7 +387,7 @@ function look() {
   showTask();
 }
 
-/** Marks the present method and mass among those that the step offers. */
+/** If the step offers methods or masses, marks the present one. */
 function showChosen() {
   const { method } = /** @type {any} */ (state.integrator);
   const mass = state.params?.masses.at(-1);

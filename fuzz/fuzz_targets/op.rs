@@ -104,9 +104,12 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
             check_name(json, "service", &call.service);
             let timeout = json.get("timeout").and_then(Json::number);
             // 0 or less means no timeout, which is the longest one.
-            let timeout = timeout.map(|timeout| match timeout > 0.0 {
-                true => duration(timeout, MAX_TIMEOUT),
-                false => MAX_TIMEOUT,
+            let timeout = timeout.map(|timeout| {
+                if timeout > 0.0 {
+                    duration(timeout, MAX_TIMEOUT)
+                } else {
+                    MAX_TIMEOUT
+                }
             });
             assert_eq!(call.timeout, timeout);
             let line = check_line(&messages::call(&call.service, "1", &call.args));

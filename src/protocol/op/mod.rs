@@ -380,14 +380,31 @@ impl<'a> OpReader<'a> {
 
     /// A call. If its service is a text, every fault gets a `service_response`.
     fn call(&self) -> Result<Op, OpError> {
-        let service = self.spelling("service").map_err(OpError::Status)?;
-        match self.name("service").and_then(|_| self.timeout()) {
-            Ok(timeout) => Ok(Op::CallService(CallService {
-                service,
-                args: self.args(),
-                timeout,
-            })),
-            Err(problem) => Err(OpError::Call { service, problem }),
+        self.valid_call().map(Op::CallService).map_err(|problem| {
+            let answer = |service, problem| OpError::Call { service, problem };
+            self.fault("service", problem, answer)
+        })
+    }
+
+    fn valid_call(&self) -> Result<CallService, Problem> {
+        Ok(CallService {
+            service: self.name("service")?,
+            timeout: self.timeout()?,
+            args: self.args(),
+        })
+    }
+
+    /// A fault of a call or a goal. Its `answer` needs the name in this field, which may be empty or too long. Without a
+    /// text there, the fault is that.
+    fn fault(
+        &self,
+        field: &'static str,
+        problem: Problem,
+        answer: impl FnOnce(String, Problem) -> OpError,
+    ) -> OpError {
+        match self.typed(field, A_NAME, json::text) {
+            Ok(name) => answer(name.into_owned(), problem),
+            Err(no_text) => OpError::Status(no_text),
         }
     }
 
@@ -568,11 +585,6 @@ impl<'a> OpReader<'a> {
         Ok(name.into_owned())
     }
 
-    /// The text of a name, which may be empty or too long.
-    fn spelling(&self, field: &'static str) -> Result<String, Problem> {
-        self.typed(field, A_NAME, json::text).map(Cow::into_owned)
-    }
-
     fn short(&self, field: &'static str, text: &str) -> Result<(), Problem> {
         let limit = MAX_NAME;
         if text.len() <= limit {
@@ -628,9 +640,12 @@ impl<'a> OpReader<'a> {
         let timeout = self.optional("timeout", "a finite number of seconds", |raw| {
             json::number(raw).filter(|timeout| timeout.is_finite())
         })?;
-        Ok(timeout.map(|timeout| match timeout > 0.0 {
-            true => duration(timeout, MAX_TIMEOUT),
-            false => MAX_TIMEOUT,
+        Ok(timeout.map(|timeout| {
+            if timeout > 0.0 {
+                duration(timeout, MAX_TIMEOUT)
+            } else {
+                MAX_TIMEOUT
+            }
         }))
     }
 }
@@ -645,11 +660,12 @@ fn duration(seconds: f64, longest: Duration) -> Duration {
 impl OpReader<'_> {
     /// A goal. If its action is a text, every fault gets an `action_result`.
     fn goal(&self) -> Result<Op, OpError> {
-        let action = self.spelling("action").map_err(OpError::Status)?;
-        match self.valid_goal() {
-            Ok(goal) => Ok(Op::SendActionGoal(goal)),
-            Err(problem) => Err(OpError::Goal { action, problem }),
-        }
+        self.valid_goal()
+            .map(Op::SendActionGoal)
+            .map_err(|problem| {
+                let answer = |action, problem| OpError::Goal { action, problem };
+                self.fault("action", problem, answer)
+            })
     }
 
     fn valid_goal(&self) -> Result<ActionGoal, Problem> {

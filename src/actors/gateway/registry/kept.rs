@@ -24,11 +24,11 @@ pub(super) struct KeptEntry {
 
 /// The registrations of one client, sorted by name. They are withdrawn in that order.
 #[derive(Default)]
-pub(crate) struct Registrations {
-    pub(crate) advertised: BTreeMap<Box<str>, KeptEntry>,
+pub(super) struct Registrations {
+    pub(super) advertised: BTreeMap<Box<str>, KeptEntry>,
     /// Topics of its subscriptions, in its own spelling.
-    pub(crate) subscribed: BTreeSet<Arc<str>>,
-    pub(crate) served: BTreeMap<(Served, Box<str>), KeptEntry>,
+    pub(super) subscribed: BTreeSet<Arc<str>>,
+    pub(super) served: BTreeMap<(Served, Box<str>), KeptEntry>,
 }
 
 impl Kept {

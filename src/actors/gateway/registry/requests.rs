@@ -43,10 +43,7 @@ impl Registry {
         let own = Service::from_name(&call.service);
         let refusal = match (self.closed, own) {
             (Some(why), _) => Err(Refusal::Closed(why)),
-            (None, Some(service)) if self.nodes.services.contains_key(&service) => {
-                return self.call_node(service, origin, call);
-            }
-            (None, Some(_)) => Err(NoService::NotServed(call.service.clone()).into()),
+            (None, Some(service)) => return self.call_node(service, origin, call),
             (None, None) => {
                 let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
                 let (kind, args) = (Served::Service, &call.args);
@@ -67,10 +64,14 @@ impl Registry {
         Handled::at_once()
     }
 
-    /// Sends a call to the node that serves it, and shows it to the tap.
+    /// Sends a call to the node that serves it, and shows it to the tap. Refuses it if no node does.
     fn call_node(&mut self, service: Service, origin: FrameOrigin, call: CallService) -> Handled {
-        let client = self.clients.get(&origin.from);
-        let Some((node, client)) = self.nodes.services.get(&service).zip(client) else {
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Handled::at_once();
+        };
+        let Some(node) = self.nodes.services.get(&service) else {
+            let why = NoService::NotServed(call.service.clone());
+            self.refuse_call(&origin, &call.service, &why, Some(service));
             return Handled::at_once();
         };
         if let Some(tap) = &mut self.tap {
