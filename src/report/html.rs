@@ -44,7 +44,7 @@ pub(crate) fn page(sections: &[Section], machine: &Machine) -> String {
     });
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><link rel=\"icon\" href=\"data:,\">\
+         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
          <title>pendularm: which method, at which timestep</title>\n<style>{STYLE}{PAGE_STYLE}</style></head>\n<body>\
          <header><h1>Which method, at which timestep, for which error, at what cost</h1>\
          <p>The arm of pendularm under each of its integrators. Version {}.</p></header><nav>{}\
