@@ -3,6 +3,7 @@
 // Invariant: every change can be undone, and refusals are shown.
 
 import { announce, byId, passFocus } from "./dom.js";
+import { inPageNames } from "./format.js";
 import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, setState } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
 import { state, tell, watch } from "./store.js";
@@ -44,7 +45,7 @@ export async function takeBack() {
   announce("Undone.");
 }
 
-/** Applies the given settings, and returns the refusals. The controller is last, so it never acts with half of the settings. */
+/** Applies the given settings, and returns the text of all refusals. The controller is last, so it never acts with half of the settings. */
 export async function apply(/** @type {import("./settings.js").Settings} */ { integrator, params, gains, period, controller, setpoint, start }) {
   applying = true;
   tell("anew");
@@ -58,18 +59,23 @@ export async function apply(/** @type {import("./settings.js").Settings} */ { in
   if (start) answers.push(await setState(start.position ?? new Array(state.links).fill(0), start.velocity));
   if (controller) answers.push(await enable(true));
   applying = false;
-  return answers.filter((answer) => !answer.result).map((answer) => answer.status);
+  return textOf(answers);
 }
 
-/** Sets all settings, from the starting pose, then running or paused. Returns the refusals. @param {import("./settings.js").Settings} settings @param {boolean} paused */
+/** The refusals among these answers, with the page's names. @param {{ result: boolean, status?: string }[]} answers */
+function textOf(answers) {
+  return answers.filter((answer) => !answer.result).map((answer) => inPageNames(answer.status ?? "")).join(" ");
+}
+
+/** Sets all settings, from the starting pose, then running or paused. Returns the text of all refusals. @param {import("./settings.js").Settings} settings @param {boolean} paused */
 export async function setScene({ controller, setpoint, ...rest }, paused) {
   await enable(false);
-  const refusals = await apply({ ...rest, controller: null, setpoint: null });
+  const early = await apply({ ...rest, controller: null, setpoint: null });
   const answer = await reset();
   // A reset changes the setpoint to the starting pose, so the setpoint is sent after it.
-  refusals.push(...await apply({ integrator: null, params: null, gains: null, period: null, controller, setpoint }));
+  const late = await apply({ integrator: null, params: null, gains: null, period: null, controller, setpoint });
   if (state.paused !== paused) await pause(paused);
-  return answer.result ? refusals : [...refusals, answer.status];
+  return [early, late, textOf([answer])].filter(Boolean).join(" ");
 }
 
 /** Back to the starting pose. */

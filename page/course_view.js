@@ -152,11 +152,11 @@ async function begin() {
   if (!now.began) return;
   remember();
   const { scene, offset, paused, title, text } = STEPS[at];
-  const refusals = await setScene(scene(state.links), paused === true);
+  const refused = await setScene(scene(state.links), paused === true);
   if (mine !== now) return;
   if (offset) await setState(offset.slice(0, state.links));
   if (mine !== now) return;
-  setText(byId("course-status"), refusals.map(inPageNames).join(" "));
+  setText(byId("course-status"), refused);
   now.ready = true;
   byId("course-dial").inert = false;
   look();
@@ -262,11 +262,11 @@ async function runScene(scene) {
   const mine = now;
   remember();
   const settings = settingsOf(scene);
-  const refusals = await setScene({ ...settings, controller: settings.controller ?? false }, false);
+  const refused = await setScene({ ...settings, controller: settings.controller ?? false }, false);
   if (mine !== now) return;
   await setState(scene.start, scene.velocity);
-  now.scene = refusals.length > 0 ? `Refused: ${refusals.map(inPageNames).join(" ")}` : `${scene.name}: ${scene.expected}`;
-  if (refusals.length === 0) now.seen.scenes.add(scene.id);
+  now.scene = refused ? `Refused: ${refused}` : `${scene.name}: ${scene.expected}`;
+  if (!refused) now.seen.scenes.add(scene.id);
   look();
 }
 

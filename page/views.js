@@ -7,7 +7,6 @@ import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
 import { chooseLinks, followLink, stepInLink } from "./course_view.js";
 import { announce, byId, el, passFocus, setAddress, setText } from "./dom.js";
-import { inPageNames } from "./format.js";
 import { isAlone } from "./kernel.js";
 import { fromFragment, presentSettings, toFragment } from "./settings.js";
 import { set, state, watch } from "./store.js";
@@ -128,16 +127,16 @@ function offer() {
     passFocus(banner);
     banner.hidden = true;
   };
-  const refused = el("p", { class: "refusal" });
+  const reason = el("p", { class: "refusal" });
   banner.replaceChildren(
     el("p", {}, "This link has settings: ", el("span", { class: "offer-text" }, text)),
     el("button", { type: "button", class: "primary", onclick: async () => {
       remember();
-      const refusals = await apply(settings);
-      setText(refused, refusals.map(inPageNames).join(" "));
-      if (refusals.length === 0) done();
+      const refused = await apply(settings);
+      setText(reason, refused);
+      if (!refused) done();
     } }, "Apply"),
-    el("button", { type: "button", onclick: done }, "Ignore"), refused,
+    el("button", { type: "button", onclick: done }, "Ignore"), reason,
   );
   announce("This link has settings. Apply or ignore them.");
 }

@@ -38,6 +38,8 @@ pub fn find(path: &str) -> Option<Asset> {
     let wanted = match path.strip_prefix('/')? {
         "" => DOCUMENT,
         DOCUMENT => return None,
+        // Browsers ask for it where a document names no icon, as the report does.
+        "favicon.ico" => "icon.svg",
         name => name,
     };
     ASSETS.iter().find(|(name, _)| *name == wanted).copied()

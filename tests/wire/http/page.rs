@@ -19,11 +19,7 @@ fn the_page_and_its_files_are_served_with_their_types() {
         page.header("content-type"),
         Some("text/html; charset=utf-8")
     );
-    assert!(
-        page.text()
-            .to_ascii_lowercase()
-            .starts_with("<!doctype html>")
-    );
+    assert!(page.text().starts_with("<!DOCTYPE html>"));
     let with_query = get(runtime.address, "/?dt=0.001&method=rk4");
     assert_eq!(with_query.body, page.body);
     for (name, bytes) in ASSETS.iter().filter(|(name, _)| *name != "index.html") {
@@ -40,6 +36,8 @@ fn the_page_and_its_files_are_served_with_their_types() {
         assert_eq!(file.body, *bytes, "{name}");
     }
     assert_eq!(get(runtime.address, "/index.html").status, 404);
+    let icon = get(runtime.address, "/favicon.ico");
+    assert_eq!(icon.body, get(runtime.address, "/icon.svg").body);
 }
 
 #[test]
