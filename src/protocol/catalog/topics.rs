@@ -56,7 +56,7 @@ table! {
             "pendularm_interfaces/msg/Target target  # m, rad",
             "float64 final_distance  # m",
         ])
-            .supersedes(&["/ik_action/feedback", "ik_action/feedback"]),
+            .supersedes(&["/ik_action/feedback"]),
         /// The timed trial, 10 Hz and at every change.
         TrialStatus = published("/ik_trial/status", Node::IkTrial, "pendularm_interfaces/msg/TrialStatus", fields![
             "bool running",
@@ -170,7 +170,7 @@ impl Topic {
         self.entry().latched
     }
 
-    /// Topics, in clients' spelling. No earlier message of them may follow a message of this topic.
+    /// Topics, by their names. No earlier message of them may follow a message of this topic, or what is sent after it.
     #[must_use]
     pub const fn supersedes(self) -> &'static [&'static str] {
         self.entry().supersedes

@@ -25,7 +25,6 @@ use bytes::{Buf, Bytes};
 use self::message::{QueuedMessage, by_itself, counted};
 pub use self::throttle::Throttle;
 use self::throttle::{HeldBack, TopicLimits};
-use crate::protocol::catalog::Topic;
 use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
 use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
 
@@ -91,13 +90,9 @@ impl Outbox {
     }
 
     /// Adds a message on a topic, or a series. It is queued, or held back if the topic is throttled. If it does
-    /// not fit, the oldest messages are dropped. Held messages that it outdates are discarded.
+    /// not fit, the oldest messages are dropped.
     pub fn push(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
         self.release(now);
-        if self.holds_back() {
-            let outdated = Topic::from_name(topic).map_or(&[][..], Topic::supersedes);
-            self.discard_held(outdated);
-        }
         if !self.may_fit(&frame) {
             return;
         }
@@ -405,7 +400,7 @@ impl Outbox {
     }
 
     /// Discards all that is held back of these topics.
-    fn discard_held(&mut self, topics: &[&str]) {
+    pub fn discard_held(&mut self, topics: &[&str]) {
         for topic in topics {
             self.take_held(topic);
         }

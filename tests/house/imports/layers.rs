@@ -55,7 +55,7 @@ const PROTOCOL: [(&str, &[&str]); 8] = [
     ("wire", &["limits", "catalog"]),
     ("messages", &["wire"]),
     ("op", &["limits", "catalog", "wire", "messages"]),
-    ("outbox", &["catalog", "limits", "wire"]),
+    ("outbox", &["limits", "wire"]),
     ("ros", &["names", "catalog", "messages", "wire"]),
 ];
 

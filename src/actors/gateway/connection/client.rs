@@ -126,6 +126,7 @@ impl<S: ClientStream> Connection<S> {
                 }
             }
             ToClient::Configure { topic, throttle } => self.outbox.configure(&topic, throttle),
+            ToClient::Discard { topic } => self.outbox.discard_held(&[&*topic]),
             ToClient::Finish => {
                 self.is_finishing = true;
                 self.finish.notify_one();

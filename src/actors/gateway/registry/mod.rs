@@ -785,6 +785,11 @@ pub enum ToClient {
         /// The smallest values of all subscriptions. `None` once it is not subscribed.
         throttle: Option<Throttle>,
     },
+    /// Discard what a throttle holds back of a topic.
+    Discard {
+        /// The topic.
+        topic: Arc<str>,
+    },
     /// Send the queue, then end. The runtime is ending.
     Finish,
 }

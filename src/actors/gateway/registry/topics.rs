@@ -444,9 +444,18 @@ impl Registry {
 impl Handler<Publish> for Registry {
     type Result = ();
 
-    /// Delivers a message of a node. Stores it if its topic is latched.
+    /// Delivers a message of a node. Stores it if its topic is latched. Messages that it outdates are discarded even
+    /// if nobody subscribes to it, because an answer may follow.
     fn handle(&mut self, Publish { topic, frame }: Publish, _: &mut Context<Self>) {
         let name = topic.name();
+        for subscriber in topic
+            .supersedes()
+            .iter()
+            .flat_map(|one| self.topics.subscribers(one))
+        {
+            let topic = Arc::clone(&subscriber.spelling);
+            subscriber.mailbox.do_send(ToClient::Discard { topic });
+        }
         if !self.is_wanted(name) {
             return;
         }
