@@ -1,7 +1,7 @@
 //! Calls and goals that were forwarded to their providers and have not ended.
 //!
-//! **Invariant:** each ends once: by its provider's answer, by its deadline, or when the provider disconnects. A goal
-//! outlives its sender, but then its feedback is not sent.
+//! **Invariant:** each ends once: by its provider's answer, by its deadline, or when its caller or its provider
+//! disconnects.
 
 use std::collections::{BTreeMap, BTreeSet};
 
