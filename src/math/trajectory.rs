@@ -79,12 +79,11 @@ impl<const N: usize> JointPath<N> {
             let start = Waypoint { time: 0.0, ..start };
             points.insert(0, start);
         }
-        let pairs = points.iter().zip(points.iter().skip(1));
-        if let Some(at) = pairs
-            .into_iter()
-            .position(|(one, next)| !is_finite(one, next))
-        {
-            return Err(PathError::NotFinite(at + usize::from(!begins_before)));
+        // The first point is compared with itself.
+        let mut pairs = points.iter().take(1).chain(&points).zip(&points);
+        if let Some(at) = pairs.position(|(one, next)| !is_finite(one, next)) {
+            let at = at.saturating_sub(usize::from(begins_before));
+            return Err(PathError::NotFinite(at));
         }
         Ok(Self { points })
     }
@@ -125,7 +124,8 @@ fn is_finite<const N: usize>(before: &Waypoint<N>, next: &Waypoint<N>) -> bool {
     (0..N).all(|i| {
         let way = before.position[i].abs() + next.position[i].abs();
         let speed = v0.map_or(0.0, |v| v[i].abs()) + v1.map_or(0.0, |v| v[i].abs());
-        (12.0 * (way + speed * h.max(1.0)) + 6.0 * way / h).is_finite()
+        let rate = if h == 0.0 { 0.0 } else { 6.0 * way / h };
+        (12.0 * (way + speed * h.max(1.0)) + rate).is_finite()
     })
 }
 
@@ -322,6 +322,17 @@ mod tests {
             let less = positions.map(|position| position / 1e3);
             let slower = velocities.map(|both| both.map(|velocity| velocity / 1e3));
             assert!(is_path(times, less, slower), "less of {case}");
+        }
+        for (time, position, velocity) in
+            [(f64::NAN, 0.0, 0.0), (0.0, MAX, 0.0), (0.0, 0.0, f64::NAN)]
+        {
+            let only = Waypoint {
+                time,
+                position: [position],
+                velocity: Some([velocity]),
+            };
+            let refused = JointPath::new(only, vec![only]);
+            assert_eq!(refused, Err(PathError::NotFinite(0)));
         }
     }
 }
