@@ -235,6 +235,7 @@ impl<const N: usize> AcceptedGoal<N> {
                 "positions": self.positions.as_slice(),
                 "velocities": vec![0.0; N],
                 "accelerations": [],
+                "effort": [],
                 "time_from_start": now,
             }],
         })
