@@ -118,14 +118,14 @@ impl<const N: usize> ArmRequest<N> for Solve<N> {
 /// The arm is replaced as a whole, or not at all.
 impl<const N: usize> ArmRequest<N> for SetParams<N> {
     fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<Arm<N>> {
-        let present = arm.simulation.arm();
-        let changed = self.applied_to(present);
+        let present = *arm.simulation.arm();
+        let changed = self.applied_to(&present);
         let mut rejected = self.rejected;
         match changed {
-            Ok(changed) if changed != *present => {
+            Ok(changed) if changed != present => {
                 arm.change(ArmInput::Arm(changed));
                 arm.restart_energy_drift();
-                arm.publish_description();
+                arm.publish_description(&present);
             }
             Ok(_) => {}
             // The fields were checked with the same bounds. If the two differ, the arm's error counts.

@@ -3,6 +3,7 @@
 //! **Invariant:** nothing is computed for a topic without subscribers.
 
 use super::{LiveArm, World};
+use crate::math::arm::Arm;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::Stamp;
 use crate::protocol::messages::scene::{StringMessage, fixed_frames, moving_frames};
@@ -21,10 +22,16 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// Publishes the topics that change only with lengths and masses.
-    pub(super) fn publish_description(&self) {
-        self.publish_lasting(Topic::TfStatic);
-        self.publish_lasting(Topic::RobotDescription);
+    /// Publishes the topics that show lengths or masses, if these differ from those of the arm `before`.
+    pub(super) fn publish_description(&self, before: &Arm<N>) {
+        let arm = self.simulation.arm();
+        let is_as_long = arm.lengths().iter().eq(before.lengths());
+        if !is_as_long {
+            self.publish_lasting(Topic::TfStatic);
+        }
+        if !is_as_long || arm.masses().iter().ne(before.masses()) {
+            self.publish_lasting(Topic::RobotDescription);
+        }
     }
 
     /// Publishes a message that stays valid until the next one, if the topic has subscribers.
