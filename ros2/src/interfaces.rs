@@ -173,7 +173,7 @@ fn structure(name: String, fields: &[Field]) -> Type {
     Type {
         name: kept(name),
         fields: Box::leak(fields.iter().map(flat).collect()),
-        constants: &[],
+        constants: "",
     }
 }
 

@@ -9,8 +9,7 @@ use std::io;
 use std::path::Path;
 
 use pendularm::protocol::catalog::types::{self, Type};
-use pendularm::protocol::catalog::{Action, Field, Service};
-use pendularm::protocol::names::short_type;
+use pendularm::protocol::catalog::{Action, Service};
 
 use crate::interfaces::{NOTHING, ServiceInterface};
 
@@ -67,20 +66,13 @@ fn interfaces() -> BTreeMap<String, String> {
     texts
 }
 
-/// A part's definition: constants, then fields with their units.
+/// A part's definition.
 fn text(part: &Type) -> String {
-    let constants = part.constants.iter();
-    let constants = constants.map(|one| format!("byte {}={}\n", one.name, one.value));
     // ROS 2 adds its filler to an empty type itself.
-    let fields = part.fields.iter().filter(|field| !NOTHING.contains(field));
-    let fields = fields.map(|field: &Field| {
-        let kind = short_type(field.kind);
-        match field.unit {
-            "" => format!("{kind} {}\n", field.name),
-            unit => format!("{kind} {}  # {unit}\n", field.name),
-        }
-    });
-    constants.chain(fields).collect()
+    if part.fields == NOTHING {
+        return String::new();
+    }
+    types::own_text(*part)
 }
 
 fn manifest() -> String {

@@ -48,7 +48,8 @@ table! {
             result: message("control_msgs/action/FollowJointTrajectory_Result", fields![
                 "int32 error_code",
                 "string error_string",
-            ]),
+            ])
+                .with_constants("int32 SUCCESSFUL=0 INVALID_GOAL=-1 INVALID_JOINTS=-2 OLD_HEADER_TIMESTAMP=-3 PATH_TOLERANCE_VIOLATED=-4 GOAL_TOLERANCE_VIOLATED=-5"),
             feedback: message("control_msgs/action/FollowJointTrajectory_Feedback", fields![
                 "std_msgs/msg/Header header",
                 "string[] joint_names",

@@ -86,21 +86,8 @@ pub struct Type {
     pub name: &'static str,
     /// Its fields, in the order of the definition.
     pub fields: &'static [Field],
-    /// Its constants.
-    pub constants: &'static [Constant],
-}
-
-/// A named value of a type, a `byte`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Constant {
-    /// `WARN`.
-    pub name: &'static str,
-    /// `30`.
-    pub value: &'static str,
-}
-
-pub(super) const fn byte(name: &'static str, value: &'static str) -> Constant {
-    Constant { name, value }
+    /// Its constants: their type, then each with its value, `uint8 WARN=30 ERROR=40`. Empty if it has none.
+    pub constants: &'static str,
 }
 
 /// A message type without constants.
@@ -108,14 +95,21 @@ pub(crate) const fn message(name: &'static str, fields: &'static [Field]) -> Typ
     Type {
         name,
         fields,
-        constants: &[],
+        constants: "",
     }
 }
 
 impl Type {
     /// The same type with constants.
-    pub(super) const fn constants(self, constants: &'static [Constant]) -> Self {
+    pub(crate) const fn with_constants(self, constants: &'static str) -> Self {
         Self { constants, ..self }
+    }
+
+    /// The type, the name and the value of each constant.
+    pub fn constants(self) -> impl Iterator<Item = (&'static str, &'static str, &'static str)> {
+        let (kind, all) = self.constants.split_once(' ').unwrap_or_default();
+        let all = all.split_ascii_whitespace();
+        all.filter_map(move |one| one.split_once('=').map(|(name, value)| (kind, name, value)))
     }
 }
 
@@ -135,7 +129,7 @@ pub(super) struct TopicEntry {
     pub(super) owner: Node,
     pub(super) type_name: &'static str,
     pub(super) fields: &'static [Field],
-    pub(super) constants: &'static [Constant],
+    pub(super) constants: &'static str,
     pub(super) direction: Direction,
     pub(super) latched: bool,
     pub(super) supersedes: &'static [&'static str],
@@ -153,7 +147,7 @@ pub(super) const fn published(
         owner,
         type_name,
         fields,
-        constants: &[],
+        constants: "",
         direction: Direction::Published,
         latched: false,
         supersedes: &[],
@@ -191,7 +185,7 @@ impl TopicEntry {
     }
 
     /// The topic's type has constants.
-    pub(super) const fn constants(self, constants: &'static [Constant]) -> Self {
+    pub(super) const fn constants(self, constants: &'static str) -> Self {
         Self { constants, ..self }
     }
 }

@@ -1,9 +1,9 @@
 //! The types inside other types: parts of messages, of requests and responses, of parameters, and the types of which
 //! ROS 2 builds services and actions.
 //!
-//! **Invariant:** the fields of a type of ROS are those of its definition. Parts that nothing here uses are empty.
+//! **Invariant:** the fields and constants of a type of ROS are those of its definition in Jazzy.
 
-use super::entry::{Constant, Field, Type, byte, fields, message};
+use super::entry::{Field, Type, fields, message};
 
 /// The members of `params` in a request are the fields of `/arm_sim/set_params`.
 pub(super) const PARAMS: &[Field] = fields![
@@ -33,8 +33,8 @@ pub(super) const TRANSFORMS: &[Field] = fields!["geometry_msgs/msg/TransformStam
 macro_rules! types {
     (@fields [$($field:literal),* $(,)?]) => { fields![$($field),*] };
     (@fields $fields:ident) => { $fields };
-    ($($name:literal: $fields:tt $(with $constants:ident)?,)*) => {
-        &[$(message($name, types!(@fields $fields))$(.constants($constants))?),*]
+    ($($name:literal: $fields:tt $(with $constants:literal)?,)*) => {
+        &[$(message($name, types!(@fields $fields))$(.with_constants($constants))?),*]
     };
 }
 
@@ -62,7 +62,7 @@ pub(super) const TYPES: &[Type] = types! {
         "actionlib_msgs/msg/GoalID goal_id",
         "uint8 status",
         "string text",
-    ],
+    ] with "uint8 PENDING=0 ACTIVE=1 PREEMPTED=2 SUCCEEDED=3 ABORTED=4 REJECTED=5 PREEMPTING=6 RECALLING=7 RECALLED=8 LOST=9",
     "tf2_web_republisher/msg/TFSubscriptionGoal": FRAME_GOAL,
     "tf2_web_republisher/msg/TFSubscriptionFeedback": TRANSFORMS,
     "diagnostic_msgs/msg/DiagnosticStatus": [
@@ -71,7 +71,7 @@ pub(super) const TYPES: &[Type] = types! {
         "string message",
         "string hardware_id",
         "diagnostic_msgs/msg/KeyValue[] values",
-    ] with HEALTH,
+    ] with "byte OK=0 WARN=1 ERROR=2 STALE=3",
     "diagnostic_msgs/msg/KeyValue": ["string key", "string value"],
     "pendularm_interfaces/msg/Target": ["float64 x  # m", "float64 y  # m", "float64 phi  # rad"],
     "geometry_msgs/msg/TransformStamped": [
@@ -138,7 +138,8 @@ pub(super) const TYPES: &[Type] = types! {
     "rcl_interfaces/msg/ListParametersResult": ["string[] names", "string[] prefixes"],
     "rcl_interfaces/msg/SetParametersResult": ["bool successful", "string reason"],
     "action_msgs/msg/GoalStatusArray": ["action_msgs/msg/GoalStatus[] status_list"],
-    "action_msgs/msg/GoalStatus": ["action_msgs/msg/GoalInfo goal_info", "int8 status"],
+    "action_msgs/msg/GoalStatus": ["action_msgs/msg/GoalInfo goal_info", "int8 status"]
+        with "int8 STATUS_UNKNOWN=0 STATUS_ACCEPTED=1 STATUS_EXECUTING=2 STATUS_CANCELING=3 STATUS_SUCCEEDED=4 STATUS_CANCELED=5 STATUS_ABORTED=6",
     "action_msgs/msg/GoalInfo": [
         "unique_identifier_msgs/msg/UUID goal_id",
         "builtin_interfaces/msg/Time stamp  # s, ns",
@@ -149,7 +150,7 @@ pub(super) const TYPES: &[Type] = types! {
         "builtin_interfaces/msg/Time stamp  # s, ns",
         "uint8[16] client_gid",
         "int64 sequence_number",
-    ],
+    ] with "uint8 REQUEST_SENT=0 REQUEST_RECEIVED=1 RESPONSE_SENT=2 RESPONSE_RECEIVED=3",
     "control_msgs/msg/JointComponentTolerance": [
         "string joint_name",
         "uint16 component",
@@ -173,10 +174,3 @@ pub(super) const TYPES: &[Type] = types! {
         "geometry_msgs/msg/Vector3 angular  # rad/s",
     ],
 };
-
-const HEALTH: &[Constant] = &[
-    byte("OK", "0"),
-    byte("WARN", "1"),
-    byte("ERROR", "2"),
-    byte("STALE", "3"),
-];

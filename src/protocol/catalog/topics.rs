@@ -2,9 +2,7 @@
 //!
 //! **Invariant:** a row has the whole type of its messages, so every topic has a definition.
 
-use super::entry::{
-    Constant, Direction, Field, TopicEntry, Type, byte, fields, message, published, subscribed,
-};
+use super::entry::{Direction, Field, TopicEntry, Type, fields, message, published, subscribed};
 use super::node::Node;
 use super::parts::TRANSFORMS;
 use super::table::{named, table};
@@ -113,7 +111,7 @@ table! {
             "string function",
             "uint32 line",
         ])
-        .constants(LOG_LEVELS),
+        .constants("uint8 DEBUG=10 INFO=20 WARN=30 ERROR=40 FATAL=50"),
         /// The local error of the arm's steps, 10 Hz.
         ErrorEstimate =
             published("/arm_sim/error_estimate", Node::ArmSim, "pendularm_interfaces/msg/ErrorEstimate", fields![
@@ -126,14 +124,6 @@ table! {
         ]),
     }
 }
-
-const LOG_LEVELS: &[Constant] = &[
-    byte("DEBUG", "10"),
-    byte("INFO", "20"),
-    byte("WARN", "30"),
-    byte("ERROR", "40"),
-    byte("FATAL", "50"),
-];
 
 /// A goal's name in ROS 1.
 const GOAL_ID: &[Field] = fields!["builtin_interfaces/msg/Time stamp  # s, ns", "string id?",];
@@ -179,7 +169,7 @@ impl Topic {
     /// The type of its messages.
     pub(super) const fn message(self) -> Type {
         let row = self.entry();
-        message(row.type_name, row.fields).constants(row.constants)
+        message(row.type_name, row.fields).with_constants(row.constants)
     }
 
     /// The fields of a message.

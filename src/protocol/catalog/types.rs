@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use super::Action;
 use super::entry::Field;
-pub use super::entry::{Constant, Count, Type};
+pub use super::entry::{Count, Type};
 use super::parts;
 use super::topics::Topic;
 use crate::protocol::names;
@@ -95,9 +95,11 @@ pub fn definition(first: Type) -> String {
     text
 }
 
-fn own_text(one: Type) -> String {
-    let constants = one.constants.iter();
-    let constants = constants.map(|one| format!("byte {}={}\n", one.name, one.value));
+/// The definition of one type: constants, then fields with their units.
+#[must_use]
+pub fn own_text(one: Type) -> String {
+    let constants = one.constants();
+    let constants = constants.map(|(kind, name, value)| format!("{kind} {name}={value}\n"));
     let fields = one.fields.iter().map(|field| {
         let kind = names::short_type(field.kind);
         match field.unit {

@@ -15,9 +15,10 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 PATIENCE = 60
+JAZZY = get_typestore(Stores.ROS2_JAZZY)
 
 # A record that was ended ends as it begins.
 MAGIC = b"\x89MCAP0\r\n"
@@ -50,6 +51,10 @@ def record(path, end):
         ros.run(timeout=PATIENCE)
         call = lambda name, args: roslibpy.Service(ros, name, "").call(roslibpy.ServiceRequest(args), timeout=PATIENCE)
         call("/pid_controller/enable", {"data": True})
+        listed = call("/rosapi/topics_and_raw_types", {})
+        for name, text in zip(listed["types"], listed["typedefs_full_text"]):
+            for part, fields in get_types_from_msg(text, name).items():
+                assert JAZZY.fielddefs.get(part, fields) == fields, part
         setpoints = roslibpy.Topic(ros, "/joint_trajectory", "trajectory_msgs/JointTrajectory")
         setpoints.publish(roslibpy.Message({"points": [{"positions": [0.1, 0.2]}]}))
         time.sleep(0.5)
@@ -127,7 +132,7 @@ assert json.loads(by_topic["/recorder/calls"][0][2].content) == {"data": True}
 print(f"mcap, mcap-ros2-support: {len(messages)} messages on {len(by_topic)} topics")
 
 # rosbags has the types of ROS, and reads this project's types from the file.
-with AnyReader([whole], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+with AnyReader([whole], default_typestore=JAZZY) as reader:
     count = 0
     for connection, _, raw in reader.messages():
         message = reader.deserialize(raw, connection.msgtype)

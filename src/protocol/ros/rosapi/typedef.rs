@@ -72,8 +72,8 @@ fn typedef(one: &Type, ending: &str) -> Value {
         "fieldtypes": kinds.collect::<Value>(),
         "fieldarraylen": lengths.collect::<Value>(),
         "examples": examples.collect::<Value>(),
-        "constnames": one.constants.iter().map(|one| one.name).collect::<Value>(),
-        "constvalues": one.constants.iter().map(|one| one.value).collect::<Value>(),
+        "constnames": one.constants().map(|(_, name, _)| name).collect::<Value>(),
+        "constvalues": one.constants().map(|(_, _, value)| value).collect::<Value>(),
     })
 }
 
