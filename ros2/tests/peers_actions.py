@@ -94,9 +94,12 @@ def test_a_goal_is_sent_as_an_action(peer, session):
     assert all(len(one.feedback.positions) == 2 for one in mine), received
     _, accepted = goal(2, 5.0, 5.0)
     assert not accepted, "five metres are out of reach"
-    # It does not end by itself before it is cancelled.
+    # A paused arm sends no feedback, and accepts the goal at once. It does not end by itself before it is cancelled.
+    switch = ("pendularm_interfaces/srv/Pause", "bool data", "bool data\nbool success\nstring message")
+    pause = peer.service("/arm_sim/pause", *switch)
+    assert pause.call(data=True).data
     name, accepted = goal(3, -1.0, 0.5, success_hold=1e6)
-    assert accepted
+    assert accepted and not pause.call(data=False).data
     everything = of["action_msgs/msg/GoalInfo"](goal_id=name, stamp=of[TIME](sec=0, nanosec=0))
     cancelled = cancel.call(goal_info=everything)
     assert cancelled.return_code == 0 and len(cancelled.goals_canceling) == 1, cancelled

@@ -1,6 +1,6 @@
 //! An action of the arm in the graph: three services and two topics, as in ROS 2.
 //!
-//! **Invariant:** a goal is accepted at the arm's first message about it. Every caller that waits for its end is
+//! **Invariant:** a goal is accepted or refused at once, before its feedback. Every caller that waits for its end is
 //! answered, at the latest when the arm disconnects.
 
 use std::rc::Rc;
@@ -147,7 +147,7 @@ impl ActionBridge {
         request.respond(&self.interface.send_goal, &response);
     }
 
-    /// The arm has sent a message about a goal, so it has accepted it.
+    /// The arm has accepted a goal.
     fn accept(&mut self, id: GoalId) {
         let accepted = self.goals.accept(id);
         if let Some((request, stamp)) = accepted {
@@ -260,6 +260,7 @@ impl Handler<GoalUpdate> for ActionBridge {
             return;
         };
         match what {
+            GoalEvent::Accepted => self.accept(id),
             GoalEvent::Feedback(values) => {
                 self.accept(id);
                 let message = json!({"goal_id": id.json(), "feedback": values});

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use actix::prelude::*;
+use pendularm::protocol::catalog::{Rosapi, Service};
 use serde_json::{Value, json};
 use tokio::sync::{mpsc, oneshot};
 
@@ -103,23 +104,19 @@ impl Gateway {
 }
 
 impl Gateway {
-    /// Passes feedback or the end of a goal to its sender.
-    fn tell_of_goal(&mut self, mut frame: Value, is_end: bool) {
+    /// Passes an event of a goal, made of the frame's status and values, to its sender.
+    fn tell_of_goal(&mut self, mut frame: Value, event: impl FnOnce(i8, Value) -> GoalEvent) {
         let id = text(&frame, "id").to_owned();
+        let Some(to) = self.goals.get(&id).cloned() else {
+            return;
+        };
         let values = frame.get_mut("values").map(Value::take).unwrap_or_default();
         let status = frame.get("status").and_then(Value::as_i64);
-        let to = if is_end {
-            self.goals.remove(&id)
-        } else {
-            self.goals.get(&id).cloned()
-        };
-        let Some(to) = to else { return };
-        let what = if is_end {
-            let status = status.and_then(|status| i8::try_from(status).ok());
-            GoalEvent::End(status.unwrap_or_default(), values)
-        } else {
-            GoalEvent::Feedback(values)
-        };
+        let status = status.and_then(|status| i8::try_from(status).ok());
+        let what = event(status.unwrap_or_default(), values);
+        if let GoalEvent::End(..) = what {
+            self.goals.remove(&id);
+        }
         if to.try_send(GoalUpdate { id, what }).is_err() {
             report::say("feedback or result of a goal was dropped: its action is busy");
         }
@@ -152,9 +149,11 @@ impl Handler<FrameReceived> for Gateway {
                     report::say("a message of the arm's was dropped: its publisher is busy");
                 }
             }
-            "service_response" => self.answered(frame),
-            "action_feedback" => self.tell_of_goal(frame, false),
-            "action_result" => self.tell_of_goal(frame, true),
+            "service_response" if text(&frame, "id").is_empty() => self.answered(frame),
+            // The arm has sent the reason before this, if it has refused the goal.
+            "service_response" => self.tell_of_goal(frame, |_, _| GoalEvent::Accepted),
+            "action_feedback" => self.tell_of_goal(frame, |_, values| GoalEvent::Feedback(values)),
+            "action_result" => self.tell_of_goal(frame, GoalEvent::End),
             "status" if matches!(text(&frame, "level"), "error" | "warning") => {
                 report::say(&format!("the arm says: {}", text(&frame, "msg")));
             }
@@ -225,6 +224,8 @@ impl Handler<ForwardGoal> for Gateway {
             &json!({"op": "send_action_goal", "id": id, "action": name, "action_type": kind,
             "args": goal, "feedback": true}),
         )?;
+        // A paused arm sends nothing about a goal. It answers this call after it has accepted or refused the goal.
+        self.write(&json!({"op": "call_service", "id": id, "service": Service::Rosapi(Rosapi::GetTime).name()}))?;
         self.goals.insert(id, to);
         Ok(())
     }

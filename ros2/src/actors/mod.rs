@@ -124,6 +124,8 @@ pub struct GoalUpdate {
 /// An event in the life of a goal.
 #[derive(Debug)]
 pub enum GoalEvent {
+    /// The arm has accepted it.
+    Accepted,
     /// Feedback.
     Feedback(Value),
     /// It has ended, with a status of `action_msgs/msg/GoalStatus`; 0 if it was never accepted.
