@@ -108,6 +108,18 @@ impl<const N: usize> JointPath<N> {
             }
         }
     }
+
+    /// The desired positions `time` after the start \[s\], and the mean velocities over the next `hold` \[s\]: a setpoint
+    /// that is held for that time, in which the path may end or turn.
+    #[must_use]
+    pub fn held(&self, time: f64, hold: f64) -> Setpoint<N> {
+        let (now, then) = (self.at(time), self.at(time + hold));
+        let mean = |i| (then.position[i] - now.position[i]) / hold;
+        Setpoint {
+            velocity: std::array::from_fn(mean),
+            ..now
+        }
+    }
 }
 
 fn at_rest<const N: usize>(position: [f64; N]) -> Setpoint<N> {

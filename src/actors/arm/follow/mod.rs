@@ -230,7 +230,9 @@ impl<const N: usize> PathFollower<N> {
             goal.client.feed_back(values);
         }
         let next = match standing {
-            Standing::Moving | Standing::Arrived => desired,
+            Standing::Moving | Standing::Arrived => {
+                goal.course.path.held(time, PERIOD.as_secs_f64())
+            }
             Standing::OffPath(_) | Standing::Late(_) => at_rest(&pose.state),
         };
         let moved = MoveSetpoint {
