@@ -3,7 +3,7 @@
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::Command;
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 use pendularm::record::{
     CALLS, Content, INPUTS, McapWriter, RecordEnding, RecordEntry, RecordedMessage, Recording,
@@ -71,6 +71,8 @@ fn assert_qos(file: &Path) {
 fn a_run_is_recorded_whole_and_replayed() {
     let folder = Folder::new("record-whole");
     let file = folder.join("run.mcap");
+    let time_of_day = || SystemTime::UNIX_EPOCH.elapsed().unwrap().as_nanos();
+    let began = time_of_day();
     let runtime = Runtime::with(&["--links", "3", "--seed", "5", "--record", text(&file)]);
     let mut client = runtime.connect();
     client.ask("/pid_controller/enable", json!({"data": true}));
@@ -87,6 +89,9 @@ fn a_run_is_recorded_whole_and_replayed() {
     for topic in [INPUTS, STATES, CALLS, "/joint_states", "/tf", "/clock"] {
         assert!(passages.iter().any(|one| one.topic == topic), "{topic}");
     }
+    let times = passages.iter().map(|one| u128::from(one.log_time));
+    assert!(times.clone().is_sorted() && times.clone().all(|time| time > began));
+    assert!(times.max() < Some(time_of_day()));
     assert_qos(&file);
     let verdict = replay(File::open(&file).unwrap()).unwrap();
     assert_eq!((verdict.links, verdict.difference), (3, None));
