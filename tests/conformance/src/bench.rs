@@ -13,7 +13,7 @@ use crate::Got;
 use crate::arm::{Arm, State};
 use crate::method::step;
 use crate::peer::{Answer, PATIENCE, Peer, Trouble, is_message};
-use crate::values::{largest, list, minus, must, near, number, numbers, numbers_of, text};
+use crate::values::{largest, list, minus, must, near, number, numbers, numbers_of, set, text};
 
 /// Standard gravity of the specification.
 pub const GRAVITY: f64 = 9.81;
@@ -28,15 +28,15 @@ pub struct Found {
     /// A message on `/joint_states`.
     pub state: Result<Joints, String>,
     /// Services of the preparation that give no answer at all; they are left out of it.
-    pub silent: Vec<&'static str>,
+    silent: Vec<&'static str>,
 }
 
 /// Services that return settings, in the order in which these are restored.
 const SETTINGS: [&str; 5] =
     ["/arm_sim/set_params", "/arm_sim/set_integrator", "/pid_controller/set_gains", "/pid_controller/enable", "/arm_sim/pause"];
 
-/// Services that end a trial and a goal.
-const ENDING: [&str; 2] = ["/ik_trial/stop", "/ik_action/cancel_goal"];
+/// Services that end a trial, a goal and a motion.
+const ENDING: [&str; 3] = ["/ik_trial/stop", "/ik_action/cancel_goal", "/arm_sim/reset"];
 
 impl Found {
     /// Asks the server at an address.
@@ -49,12 +49,19 @@ impl Found {
         let links = match links {
             Some(links) if links == 2 || links == 3 => links,
             Some(links) => return Err(format!("the server at {address} has {links} links; the specification has 2 or 3")),
+            // A server of the checkpoint needs no arm.
+            None if bench.peer.call("/arm_sim/integration_step", &json!({})).is_ok() => 2,
             None => return Err(format!("the server at {address} tells no number of links: {}", params.err().unwrap_or_default())),
         };
-        let settings = SETTINGS.map(|service| bench.accepted(service, &json!({})));
-        // A rejection is an answer.
-        let is_silent = |service: &&str| bench.peer.call(service, &json!({})).is_err();
-        let silent = ENDING.into_iter().filter(is_silent).collect();
+        let (mut silent, has_arm) = (Vec::new(), by_params.is_some() || state.is_ok());
+        let mut ask = |service| {
+            let answer = if has_arm { bench.peer.call(service, &json!({})) } else { Err("the server has no arm".to_owned()) };
+            // A rejection is an answer.
+            let Answer { values, result, status, .. } = answer.inspect_err(|_| silent.push(service))?;
+            must(result, || format!("{service} is rejected: {status}")).map(|()| values)
+        };
+        let settings = SETTINGS.map(&mut ask);
+        drop(ENDING.map(ask));
         Ok(Self { links, settings, state, silent })
     }
 
@@ -380,7 +387,7 @@ impl Bench {
                 if error <= 1e-6 {
                     break;
                 }
-                must(steps < limit, || format!("after {steps} steps: {} is no state of {method} at {dt} s", list(&joints.position)))?;
+                must(steps < limit, || format!("{} is none of the next {steps} states of {method} at {dt} s", list(&joints.position)))?;
                 own = step(method, &own, 0.0, dt, |_, q, v| arm.free_acceleration(q, v));
                 steps += 1;
             }
@@ -430,7 +437,7 @@ pub fn same(before: &Value, after: &Value, members: &[&str]) -> Result<(), Strin
                 _ => one.is_some() && one == other,
             },
         };
-        let show = |value: Option<&Value>| value.map_or_else(|| "nothing".to_owned(), ToString::to_string);
+        let show = |value: Option<&Value>| value.map_or_else(|| "missing".to_owned(), ToString::to_string);
         must(is_same, || format!("{name} was {} and is {}", show(one), show(other)))?;
     }
     Ok(())
@@ -446,9 +453,7 @@ pub fn has(expected: &Value, got: &Value) -> Result<(), String> {
 pub fn apply_alone(bench: &mut Bench, service: &str, before: Value, changes: &[(&str, Value)]) -> Got {
     let mut expected = before;
     for (name, value) in changes {
-        if let Some(members) = expected.as_object_mut() {
-            members.insert((*name).to_owned(), value.clone());
-        }
+        set(&mut expected, name, value.clone());
         has(&expected, &bench.accepted(service, &json!({ (*name): value }))?)?;
     }
     Ok("each field alone".to_owned())

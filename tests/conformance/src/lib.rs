@@ -11,7 +11,7 @@ pub mod peer;
 pub mod rules;
 pub mod values;
 
-use std::fmt::{self, Write as _};
+use std::fmt;
 use std::time::{Duration, Instant};
 
 use bench::{Bench, Found};
@@ -90,7 +90,7 @@ pub struct Selection {
 
 impl Default for Selection {
     fn default() -> Self {
-        Self { time: Duration::from_secs(60), category: None, rule: None }
+        Self { time: Duration::from_secs(180), category: None, rule: None }
     }
 }
 
@@ -118,7 +118,7 @@ pub fn run(address: &str, selection: &Selection, mut tell: impl FnMut(&Row)) -> 
         let got = if began.elapsed() < selection.time {
             Bench::prepared(address, &found).map_err(|why| format!("while preparing: {why}")).and_then(|mut bench| (rule.check)(&mut bench))
         } else {
-            Err(format!("not tried: the run had taken {} s", selection.time.as_secs()))
+            Err(format!("not tried: the run had taken {} s; --rule {} tries it alone", selection.time.as_secs(), rule.id))
         };
         let row = Row { rule, got };
         tell(&row);
@@ -131,14 +131,10 @@ pub fn run(address: &str, selection: &Selection, mut tell: impl FnMut(&Row)) -> 
 /// The totals, one line a category.
 #[must_use]
 pub fn totals(rows: &[Row]) -> String {
-    let mut text = String::new();
-    for category in CATEGORIES {
-        let here = rows.iter().filter(|row| row.rule.category == category);
+    let lines = CATEGORIES.into_iter().chain(["All"]).map(|name| {
+        let here = rows.iter().filter(|row| row.rule.category == name || name == "All");
         let (holding, all) = here.fold((0, 0), |(holding, all), row| (holding + usize::from(row.holds()), all + 1));
-        // A `String` takes every line.
-        let _ = writeln!(text, "{category:<30} {holding:>3} of {all:>3}");
-    }
-    let holding = rows.iter().filter(|row| row.holds()).count();
-    let _ = write!(text, "{:<30} {holding:>3} of {:>3}", "All", rows.len());
-    text
+        format!("{name:<30} {holding:>3} of {all:>3}")
+    });
+    lines.collect::<Vec<_>>().join("\n")
 }

@@ -17,9 +17,13 @@ fn main() -> ExitCode {
         return ExitCode::from(2);
     };
     match run(&address, &selection, |row| println!("{row}")) {
+        Ok(rows) if rows.is_empty() => {
+            eprintln!("no rule has this --category and --rule\n{USAGE}");
+            ExitCode::from(2)
+        }
         Ok(rows) => {
             println!("\n{}", totals(&rows));
-            ExitCode::from(u8::from(rows.is_empty() || rows.iter().any(|row| !row.holds())))
+            ExitCode::from(u8::from(rows.iter().any(|row| !row.holds())))
         }
         Err(why) => {
             eprintln!("{why}");

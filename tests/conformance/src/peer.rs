@@ -83,7 +83,7 @@ impl Peer {
         self.send(&call(service, args, &id))?;
         let until = Instant::now() + PATIENCE;
         let frame = self.find(until, |frame| is_response_to(frame, &id)).map_err(|trouble| match trouble {
-            Trouble::Silence => format!("{service} gave no answer within {} s", PATIENCE.as_secs()),
+            Trouble::Silence => format!("{service} gave no answer with id {id} within {} s", PATIENCE.as_secs()),
             Trouble::Broken(why) => why,
         })?;
         Ok(Answer {

@@ -10,6 +10,13 @@ pub fn member<'a>(value: &'a Value, path: &str) -> Result<&'a Value, String> {
     value.pointer(&format!("/{path}")).ok_or_else(|| format!("no {path} in {}", beginning(&value.to_string())))
 }
 
+/// Sets a member of an object.
+pub fn set(object: &mut Value, name: &str, value: Value) {
+    if let Some(members) = object.as_object_mut() {
+        members.insert(name.to_owned(), value);
+    }
+}
+
 /// The value at a path as `read` has it.
 fn as_kind<'a, T>(value: &'a Value, path: &str, kind: &str, read: impl FnOnce(&'a Value) -> Option<T>) -> Result<T, String> {
     let found = member(value, path)?;
@@ -56,7 +63,7 @@ pub fn near(name: &str, got: &[f64], expected: &[f64], tolerance: f64) -> Result
         // `NaN` is not near to anything.
         let is_near = (one - other).abs() <= tolerance * (1.0 + other.abs());
         if !is_near {
-            return Err(format!("{name}[{at}] is {one:.9} instead of {other:.9}"));
+            return Err(format!("{name}[{at}] is {one:?} instead of {other:?}"));
         }
     }
     Ok(())
@@ -79,16 +86,15 @@ pub fn minus(left: &[f64], right: &[f64]) -> Vec<f64> {
     left.iter().zip(right).map(|(left, right)| left - right).collect()
 }
 
+/// A number for a reader. A small one, and one of an arm that diverged, has an exponent.
+#[must_use]
+pub fn plain(value: f64) -> String {
+    if value == 0.0 || (0.01..1e6).contains(&value.abs()) { format!("{value:.4}") } else { format!("{value:.3e}") }
+}
+
 /// Numbers for a reader.
 #[must_use]
 pub fn list(values: &[f64]) -> String {
-    let shown: Vec<String> = values.iter().map(|value| format!("{value:.4}")).collect();
-    format!("[{}]", shown.join(", "))
-}
-
-/// Small numbers for a reader.
-#[must_use]
-pub fn fine(values: &[f64]) -> String {
-    let shown: Vec<String> = values.iter().map(|value| format!("{value:.3e}")).collect();
+    let shown: Vec<String> = values.iter().copied().map(plain).collect();
     format!("[{}]", shown.join(", "))
 }

@@ -35,9 +35,7 @@ pub const CHECKS: &[Check] = &[
     ("dynamics-4", |bench| {
         let pose = bench.float(0.0, 0.0, 0.0)?;
         let mut kp = bench.each(0.0);
-        if let Some(first) = kp.first_mut() {
-            *first = 5.0;
-        }
+        kp.splice(..1, [5.0]);
         bench.accepted("/pid_controller/set_gains", &json!({"kp": kp}))?;
         bench.hold(&shifted(&pose, 1.0))?;
         let Joints { velocity, effort, .. } = bench.joints_for(0.3)?.pop().ok_or("no joint states")?;
@@ -55,7 +53,7 @@ pub const CHECKS: &[Check] = &[
         let kinetic: Vec<f64> = states.iter().map(|state| arm.kinetic(state)).collect();
         let total: Vec<f64> = states.iter().zip(&kinetic).map(|(state, kinetic)| kinetic + arm.potential(&state.position)).collect();
         let exchanged = deviation(&kinetic, 1.0);
-        must(exchanged > 0.1, || format!("kinetic energy changes by {exchanged:.4} J alone"))?;
+        must(exchanged > 0.1, || format!("kinetic energy changes by {exchanged:.4} J only"))?;
         let error = deviation(&total, exchanged);
         must(error < 1e-3, || format!("energy changes by {:.3} % of the {exchanged:.2} J exchanged", 100.0 * error))?;
         Ok(format!("constant to {error:.1e} while {exchanged:.2} J are exchanged"))
@@ -67,7 +65,7 @@ pub const CHECKS: &[Check] = &[
         bench.swing()?;
         let momenta: Vec<f64> = bench.joints_for(0.8)?.iter().map(|joints| arm.momentum(&joints.state())).collect();
         let size = largest(&momenta);
-        must(size > 0.1, || format!("an angular momentum of {size:.4} alone"))?;
+        must(size > 0.1, || format!("an angular momentum of {size:.4} only"))?;
         let error = deviation(&momenta, size);
         must(error < 1e-3, || format!("it changes by {:.3} % of {size:.3} kg m^2/s", 100.0 * error))?;
         Ok(format!("{size:.3} kg m^2/s, constant to {error:.1e}"))

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::Check;
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY};
-use crate::values::{boolean, member, must, near, number, numbers_of, text};
+use crate::values::{boolean, member, must, near, number, numbers_of, set, text};
 
 /// The checks of this part.
 pub const CHECKS: &[Check] = &[
@@ -135,14 +135,11 @@ const PATIENCE: Duration = Duration::from_secs(2);
 fn goal_at(bench: &Bench, pose: [f64; 3], further: &Value) -> Value {
     let pose: Vec<f64> = pose.into_iter().take(bench.links).collect();
     let (x, y, phi) = Arm::of(bench.links, GRAVITY).end_effector(&pose);
-    let mut goal = json!({"x": x, "y": y});
-    if let Some(members) = goal.as_object_mut() {
-        if bench.links == 3 {
-            members.insert("phi".to_owned(), json!(phi));
-        }
-        if let Some(further) = further.as_object() {
-            members.extend(further.clone());
-        }
+    let mut goal = further.clone();
+    set(&mut goal, "x", json!(x));
+    set(&mut goal, "y", json!(y));
+    if bench.links == 3 {
+        set(&mut goal, "phi", json!(phi));
     }
     goal
 }

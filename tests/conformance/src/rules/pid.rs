@@ -9,7 +9,7 @@ use serde_json::json;
 
 use crate::bench::{Bench, apply_alone, has, shifted};
 use crate::rules::control_services::{is_query, is_switched};
-use crate::values::{fine, largest, list, minus, must, near};
+use crate::values::{largest, list, minus, must, near, plain, set};
 use crate::{Check, Got};
 
 /// The checks of this part.
@@ -81,9 +81,7 @@ pub const CHECKS: &[Check] = &[
     }),
     ("gains-5", |bench| {
         let mut bad = bench.each(5.0);
-        if let Some(last) = bad.last_mut() {
-            *last = -5.0;
-        }
+        bad.splice(bench.links - 1.., [-5.0]);
         rejects_gains(bench, &[bad])
     }),
     ("gains-6", |bench| {
@@ -134,16 +132,13 @@ pub const CHECKS: &[Check] = &[
         let setpoint = shifted(&pose, 1.0);
         bench.hold(&setpoint)?;
         let states = bench.joints_for(0.8)?;
-        let (mut sum, mut grown) = (bench.each(0.0), bench.each(0.0));
+        let [first, .., last] = states.as_slice() else { return Err("no joint states".to_owned()) };
+        let grown: Vec<f64> = minus(&last.effort, &first.effort).iter().map(|change| change / SMALL).collect();
+        let mut sum = bench.each(0.0);
         for pair in states.windows(2) {
             let [before, after] = pair else { continue };
-            let dt = after.stamp - before.stamp;
-            let errors = minus(&setpoint, &before.position);
-            for (sum, error) in sum.iter_mut().zip(errors) {
-                *sum += error * dt;
-            }
-            for (grown, change) in grown.iter_mut().zip(minus(&after.effort, &before.effort)) {
-                *grown += change / SMALL;
+            for (sum, error) in sum.iter_mut().zip(minus(&setpoint, &before.position)) {
+                *sum += error * (after.stamp - before.stamp);
             }
         }
         let is_sum = sum.iter().zip(&grown).all(|(sum, grown)| *sum > 0.1 && (grown / sum - 1.0).abs() < 0.15);
@@ -179,7 +174,7 @@ pub const CHECKS: &[Check] = &[
             } else if inside.elapsed() > Duration::from_millis(500) {
                 return Ok(format!("within {error:.4} rad after {:.1} s", began.elapsed().as_secs_f64()));
             }
-            must(began.elapsed() < Duration::from_secs(10), || format!("{error:.4} rad off after 10 s"))?;
+            must(began.elapsed() < Duration::from_secs(10), || format!("{} rad off after 10 s", plain(error)))?;
         }
     }),
 ];
@@ -196,13 +191,13 @@ pub(crate) fn wound_up(bench: &mut Bench, milliseconds: u64) -> Result<Vec<f64>,
     bench.hold(&shifted(&pose, 1.0))?;
     sleep(Duration::from_millis(milliseconds));
     let effort = bench.fresh()?.effort;
-    must(effort.iter().all(|effort| *effort > 0.2 * SMALL), || format!("the integral does not grow: effort {}", fine(&effort)))?;
+    must(effort.iter().all(|effort| *effort > 0.2 * SMALL), || format!("the integral does not grow: effort {}", list(&effort)))?;
     Ok(effort)
 }
 
 /// Passes if every joint's effort after something compares with the one before it.
 pub(crate) fn changes(before: &[f64], after: &[f64], holds: impl Fn(f64, f64) -> bool) -> Got {
-    let told = format!("effort {} before, {} after", fine(before), fine(after));
+    let told = format!("effort {} before, {} after", list(before), list(after));
     if before.iter().zip(after).all(|(before, after)| holds(*before, *after)) { Ok(told) } else { Err(told) }
 }
 
@@ -214,10 +209,8 @@ fn rejects_gains(bench: &mut Bench, bad: &[Vec<f64>]) -> Got {
             bench.set_gains(1.0, 1.0, 1.0)?;
             let mut request = json!({"kp": bench.each(2.0), "ki": bench.each(2.0), "kd": bench.each(2.0)});
             let mut expected = request.clone();
-            if let (Some(request), Some(expected)) = (request.as_object_mut(), expected.as_object_mut()) {
-                request.insert(name.to_owned(), json!(array));
-                expected.insert(name.to_owned(), json!(bench.each(1.0)));
-            }
+            set(&mut request, name, json!(array));
+            set(&mut expected, name, json!(bench.each(1.0)));
             let answer = bench.rejected(SET_GAINS, &request)?;
             has(&expected, &answer.values)?;
             status = answer.status;

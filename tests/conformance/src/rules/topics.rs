@@ -8,7 +8,7 @@ use std::time::Duration;
 use serde_json::json;
 
 use crate::bench::{Bench, Joints, point, shifted};
-use crate::values::{largest, list, must, near};
+use crate::values::{largest, list, must, near, set};
 use crate::{Check, Got};
 
 /// The gain that makes a setpoint visible.
@@ -28,9 +28,7 @@ pub const CHECKS: &[Check] = &[
         bench.float(SMALL, 0.0, 0.0)?;
         let (angles, rest) = (angles(bench), bench.each(0.0));
         let mut last = point(&angles, &rest);
-        if let Some(time) = last.pointer_mut("/time_from_start/sec") {
-            *time = json!(5);
-        }
+        set(&mut last, "time_from_start", json!({"sec": 5, "nanosec": 0}));
         bench.command(&json!([point(&shifted(&angles, 1.0), &rest), point(&shifted(&angles, -1.0), &rest), last]))?;
         position_is(bench, &angles)
     }),
