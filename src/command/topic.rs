@@ -172,7 +172,11 @@ fn part<'a>(message: &'a RawValue, path: &str) -> Result<&'a RawValue, CommandEr
         None => member_of(value, step),
     };
     let part = path.split(['.', '[']).try_fold(message, step);
-    part.ok_or_else(|| CommandError::Refused(format!("the message has no {path}")))
+    part.ok_or_else(|| {
+        CommandError::Refused(format!(
+            "--field must be a part of the message, got \"{path}\""
+        ))
+    })
 }
 
 async fn measure(topic: &str, window: usize, session: &mut Session) -> Outcome {

@@ -38,7 +38,8 @@ table! {
 }
 
 /// The answer for an unknown parameter.
-pub const NO_SUCH: &str = "name must be that of a parameter; get_param_names lists them";
+pub const NO_SUCH: &str = "name must be that of a parameter, such as /arm_sim:gravity; \
+    /rosapi/get_param_names and `pendularm param list` list all";
 
 /// Most parameters in one call of a parameter service: each of them several times.
 pub const MAX_NAMED: usize = 64;
