@@ -219,9 +219,9 @@ class _Vector(VectorEnv[Observation, Action, Any]):
 def _arguments_and_rendering(target: str) -> str:
     """The end of both tasks' documentation. `target` names the drawn target."""
     return f"""## Arguments
-    `links`, 2 or 3. `method`, one of euler, midpoint, verlet and rk4, and its `timestep` in s, a whole part of 0.05 s:
-    by default rk4 with 0.005 s. `render_mode`, None, human or rgb_array. The vector environment also has `threads`, as
-    `Batch` does, and `max_episode_steps`, -1 for no limit.
+    `links`, 2 or 3. `method`, one of euler, midpoint, verlet and rk4, and its `timestep` in s, 0.05 s divided by a
+    whole number: by default rk4 with 0.005 s. `render_mode`, None, human or rgb_array. The vector environment also has
+    `threads`, as `Batch` does, and `max_episode_steps`, -1 for no limit.
 
     ## Rendering
     Drawn are the arm, the target (here that is {target}) and the last 2 s of the end effector's path. A frame is
