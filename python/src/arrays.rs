@@ -6,8 +6,8 @@ use std::borrow::Cow;
 
 use numpy::ndarray::Dimension;
 use numpy::{
-    Element, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
-    PyUntypedArrayMethods, ToPyArray,
+    Element, IntoPyArray, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyMemoryError, PyOverflowError};
 use pyo3::intern;
@@ -50,7 +50,8 @@ pub(crate) fn read_only<'py, T: Element, D: Dimension>(
 
 /// The value of a property that is an array.
 pub(crate) fn property<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Held<'py, PyArray1<f64>>> {
-    read_only(values.to_pyarray(py))
+    // Users cannot make it writable, because NumPy does not own its memory.
+    read_only(values.to_vec().into_pyarray(py))
 }
 
 /// An argument with numbers in an array of any shape. Contiguous doubles, row by row, stay in the caller's memory.
@@ -108,13 +109,20 @@ impl<'py> ArrayArgument<'py> {
         Ok(self.array.as_slice()?)
     }
 
-    /// The numbers as one row of `width` per arm, or one row for all arms.
-    pub(crate) fn rows(&self, arms: usize, width: usize, bound: Bound) -> PyResult<Rows<'_>> {
+    /// The numbers as one row of `width` per arm, or one row for all arms. Without `arms` only one row is valid.
+    pub(crate) fn rows(
+        &self,
+        arms: Option<usize>,
+        width: usize,
+        bound: Bound,
+    ) -> PyResult<Rows<'_>> {
         let field = &self.field;
         let shape = self.shape();
-        if shape != [width] && shape != [arms, width] {
+        if shape != [width] && arms.is_none_or(|arms| shape != [arms, width]) {
+            let arms = arms.map_or_else(|| "n".to_owned(), |arms| arms.to_string());
             return Err(refused(format_args!(
-                "{field} must have the shape ({width},) or ({arms}, {width}), got {shape:?}"
+                "{field} must have the shape ({width},) or ({arms}, {width}), got {}",
+                in_python(shape)
             )));
         }
         let is_one = shape.len() == 1;
@@ -136,7 +144,8 @@ impl<'py> ArrayArgument<'py> {
         let shape = self.shape();
         if !shape.is_empty() && shape != [arms] {
             return Err(refused(format_args!(
-                "{field} must be a number or have the shape ({arms},), got {shape:?}"
+                "{field} must be a number or have the shape ({arms},), got {}",
+                in_python(shape)
             )));
         }
         let values = self.values()?;
@@ -152,6 +161,14 @@ impl<'py> ArrayArgument<'py> {
             width: 1,
             is_one: shape.is_empty(),
         })
+    }
+}
+
+/// A shape as Python prints it.
+fn in_python(shape: &[usize]) -> String {
+    match shape {
+        [one] => format!("({one},)"),
+        all => format!("{all:?}").replace('[', "(").replace(']', ")"),
     }
 }
 

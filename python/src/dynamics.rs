@@ -67,8 +67,8 @@ fn all_rows<'py, const K: usize>(
     let mut rows: Vec<Rows<'_>> = Vec::with_capacity(K);
     for (_, numbers) in &given {
         let each = match numbers.shape() {
-            [1, _] => 1,
-            _ => count.unwrap_or(1),
+            [1, _] => Some(1),
+            _ => count,
         };
         rows.push(numbers.rows(each, links, Bound::Finite)?.of_one_for_all());
     }

@@ -11,9 +11,7 @@ use pyo3::Borrowed;
 use pyo3::exceptions::{PyOverflowError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyErr, PyResult};
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyStringMethods, PyTuple};
-
-use crate::arrays::room;
+use pyo3::types::{PyBool, PyFloat, PyInt, PyList, PyStringMethods, PyTuple};
 
 /// Most dimensions of an array, and so the largest depth of nested lists.
 const MOST_DIMENSIONS: usize = 2;
@@ -142,23 +140,6 @@ fn is_too_long_within(value: &Object<'_>, depth: usize) -> PyResult<bool> {
         }
     }
     Ok(false)
-}
-
-/// The entries of a sequence of `count` entries; `None` if it is not a sequence, or has another length.
-pub(crate) fn entries<'py>(
-    value: &Object<'py>,
-    count: usize,
-) -> PyResult<Option<Vec<Object<'py>>>> {
-    let is_sequence = !value.is_instance_of::<PyDict>() && value.hasattr("__getitem__")?;
-    if !is_sequence || !value.len().is_ok_and(|length| length == count) {
-        return Ok(None);
-    }
-    // An object may have more entries than its length says.
-    let mut all = room(count + 1)?;
-    for one in value.try_iter()?.take(count + 1) {
-        all.push(one?);
-    }
-    Ok((all.len() == count).then_some(all))
 }
 
 /// Checks numbers against a bound. `place` gives the index of a wrong one.

@@ -55,7 +55,7 @@ def test_a_refused_call_changes_nothing():
         batch.enable()
         batch.step(100)
         before = batch.energy.tolist()
-        pushing = threading.Thread(target=other.step, args=(3_000_000, batch.position.base[:1]))
+        pushing = threading.Thread(target=other.step, args=(3_000_000, batch.position.base.obj[:1]))
         pushing.start()
         try:
             # During its first piece of a dozen.

@@ -165,8 +165,8 @@ def test_no_array_of_a_property_can_be_written(thing, count):
     found = list(arrays_of(thing))
     assert len(found) == count
     for name, array in found:
-        for write in [lambda: array.fill(1), lambda: np.add(array, 1, out=array), lambda: array.sort()]:
-            with pytest.raises(ValueError, match="read-only"):
+        for write in [lambda: array.fill(1), lambda: np.add(array, 1, out=array), lambda: array.setflags(write=True)]:
+            with pytest.raises(ValueError, match="read-only|cannot set WRITEABLE"):
                 write()
         assert (array == array.copy()).all(), name
 

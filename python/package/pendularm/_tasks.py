@@ -34,7 +34,7 @@ def _substeps(timestep: float) -> int:
     ratio = STEP / timestep if timestep > 0 else 0.0
     count = round(min(ratio, 2.0 * MOST_SUBSTEPS))
     if not 1 <= count <= MOST_SUBSTEPS or abs(ratio - count) > 1e-6 * count:
-        raise ValueError(f"timestep must divide {STEP} s into at most {MOST_SUBSTEPS} equal steps, got {timestep}")
+        raise ValueError(f"timestep must be {STEP} s divided by a whole number up to {MOST_SUBSTEPS}, got {timestep}")
     return count
 
 

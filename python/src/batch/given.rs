@@ -5,35 +5,10 @@
 use numpy::{PyArray1, PyArrayMethods};
 use pendularm::math::integrator::Method;
 use pyo3::prelude::{PyAnyMethods, PyResult};
-use pyo3::types::{PyByteArray, PyBytes};
+use pyo3::types::{PyByteArray, PyBytes, PyDict};
 
-use super::Batch;
-use crate::arrays::{ArrayArgument, Rows, collected, laid_out, room};
-use crate::fields::{self, Bound, Object, entries, is_masked, is_too_long, refused, shown};
-
-impl Batch {
-    /// A row per arm, or one for all, if there is an argument.
-    pub(super) fn rows<'a>(
-        &self,
-        given: Option<&'a ArrayArgument<'_>>,
-        bound: Bound,
-    ) -> PyResult<Option<Rows<'a>>> {
-        given
-            .map(|given| given.rows(self.arms, self.links(), bound))
-            .transpose()
-    }
-
-    /// A number per arm, or one for all, if there is an argument.
-    pub(super) fn column<'a>(
-        &self,
-        given: Option<&'a ArrayArgument<'_>>,
-        bound: Bound,
-    ) -> PyResult<Option<Rows<'a>>> {
-        given
-            .map(|given| given.column(self.arms, bound))
-            .transpose()
-    }
-}
+use crate::arrays::{ArrayArgument, collected, laid_out, room};
+use crate::fields::{self, Object, is_masked, is_too_long, refused, shown};
 
 /// The array, if there is an argument.
 pub(super) fn read<'py>(
@@ -45,11 +20,26 @@ pub(super) fn read<'py>(
         .transpose()
 }
 
+/// The entries of a sequence of `count` entries; `None` if it is not a sequence, or has another length.
+fn entries<'py>(value: &Object<'py>, count: usize) -> PyResult<Option<Vec<Object<'py>>>> {
+    let is_sequence = !value.is_instance_of::<PyDict>() && value.hasattr("__getitem__")?;
+    if !is_sequence || !value.len().is_ok_and(|length| length == count) {
+        return Ok(None);
+    }
+    // An object may have more entries than its length says.
+    let mut all = room(count + 1)?;
+    for one in value.try_iter()?.take(count + 1) {
+        all.push(one?);
+    }
+    Ok((all.len() == count).then_some(all))
+}
+
 /// One number of steps for all arms, or one for each.
 pub(super) fn read_steps(steps: &Object<'_>, arms: usize) -> PyResult<Vec<u64>> {
     let expected = || {
         refused(format_args!(
-            "steps must be a whole number, or one for each of {arms} arms"
+            "steps must be a whole number, at least 0 and less than 2^64, or one for each of {arms} arms, got {}",
+            shown(steps)
         ))
     };
     // For Python, bytes are a sequence of numbers.
@@ -74,7 +64,8 @@ pub(super) fn read_methods(method: &Object<'_>, arms: usize) -> PyResult<Vec<Met
     }
     let expected = || {
         refused(format_args!(
-            "method must be a name, or one for each of {arms} arms"
+            "method must be a name, or one for each of {arms} arms, got {}",
+            shown(method)
         ))
     };
     let mut each = room(arms)?;
@@ -89,7 +80,8 @@ pub(super) fn read_methods(method: &Object<'_>, arms: usize) -> PyResult<Vec<Met
 pub(super) fn read_flags(field: &str, flag: &Object<'_>, arms: usize) -> PyResult<Vec<bool>> {
     let expected = || {
         refused(format_args!(
-            "{field} must be True or False, or one of them for each of {arms} arms"
+            "{field} must be True or False, or one of them for each of {arms} arms, got {}",
+            shown(flag)
         ))
     };
     if is_masked(flag)? {
@@ -126,7 +118,9 @@ pub(super) fn chosen(arms: Option<&Object<'_>>, count: usize) -> PyResult<Vec<us
     }
     let expected = || {
         refused(format_args!(
-            "arms must be a mask of {count} or indices below that"
+            "arms must be a mask of {count} booleans, or indices from 0 to {}, got {}",
+            count - 1,
+            shown(arms)
         ))
     };
     if is_too_long(arms)? {

@@ -22,7 +22,7 @@ use pendularm::math::simulation::{ControlPeriod, Simulation};
 use pyo3::prelude::{Py, PyAny, PyResult, Python, pyclass, pymethods};
 
 use crate::arm::for_either;
-use crate::arrays::{ArrayArgument, read_only};
+use crate::arrays::{ArrayArgument, Rows, read_only};
 use crate::fields::{self, Bound, Flag, Held, Object, Whole, refused};
 use crate::patience::{Turns, hold};
 use given::{chosen, of_arm, read, read_flags, read_methods, read_steps};
@@ -63,6 +63,30 @@ pub(crate) struct Batch {
     threads: usize,
     windows: Windows,
     turns: Turns,
+}
+
+impl Batch {
+    /// A row per arm, or one for all, if there is an argument.
+    fn rows<'a>(
+        &self,
+        given: Option<&'a ArrayArgument<'_>>,
+        bound: Bound,
+    ) -> PyResult<Option<Rows<'a>>> {
+        given
+            .map(|given| given.rows(Some(self.arms), self.links(), bound))
+            .transpose()
+    }
+
+    /// A number per arm, or one for all, if there is an argument.
+    fn column<'a>(
+        &self,
+        given: Option<&'a ArrayArgument<'_>>,
+        bound: Bound,
+    ) -> PyResult<Option<Rows<'a>>> {
+        given
+            .map(|given| given.column(self.arms, bound))
+            .transpose()
+    }
 }
 
 #[pymethods]
@@ -166,11 +190,11 @@ impl Batch {
     ) -> PyResult<()> {
         let chosen = chosen(arms, self.arms)?;
         let position = ArrayArgument::read("position", position)?;
-        let position = position.rows(chosen.len(), self.links(), Bound::Finite)?;
+        let position = position.rows(Some(chosen.len()), self.links(), Bound::Finite)?;
         let velocity = read("velocity", velocity)?;
         let velocity = velocity
             .as_ref()
-            .map(|given| given.rows(chosen.len(), self.links(), Bound::Finite))
+            .map(|given| given.rows(Some(chosen.len()), self.links(), Bound::Finite))
             .transpose()?;
         let _turn = self.turns.take(py)?;
         for_either!(Either, &self.own, lanes => {
@@ -199,7 +223,7 @@ impl Batch {
         velocities: Option<&Object<'_>>,
     ) -> PyResult<()> {
         let positions = ArrayArgument::read("positions", positions)?;
-        let positions = positions.rows(self.arms, self.links(), Bound::Finite)?;
+        let positions = positions.rows(Some(self.arms), self.links(), Bound::Finite)?;
         let velocities = read("velocities", velocities)?;
         let velocities = self.rows(velocities.as_ref(), Bound::Finite)?;
         let _turn = self.turns.take(py)?;
@@ -404,7 +428,7 @@ impl Batch {
     #[getter]
     fn end_effector<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray2<f64>>> {
         let flat = for_either!(Either, &self.own, lanes => lanes::end_effectors(&hold(py, lanes))?);
-        read_only(flat.into_pyarray(py).reshape([self.arms, 2])?)
+        read_only(flat.into_pyarray(py))?.reshape([self.arms, 2])
     }
 
     fn __len__(&self) -> usize {

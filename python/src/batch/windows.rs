@@ -5,9 +5,9 @@
 use numpy::{Element, PyArray, PyArrayMethods, PyReadwriteArray};
 use pyo3::IntoPyObject;
 use pyo3::prelude::{Py, PyAny, PyAnyMethods, PyResult, Python};
+use pyo3::types::PyMemoryView;
 
 use super::lanes::Shown;
-use crate::arrays::read_only;
 use crate::fields::{Held, refused};
 
 /// An array of the arms' values, and the users' view of it.
@@ -19,10 +19,13 @@ pub(super) struct Window<T, D> {
 
 impl<T: Element, D: numpy::ndarray::Dimension> Window<T, D> {
     pub(super) fn onto(array: Held<'_, PyArray<T, D>>) -> PyResult<Self> {
-        let view = array.call_method0("view")?.cast_into()?;
+        // Users could make a view of the array writable, but not one of read-only memory.
+        let py = array.py();
+        let memory = PyMemoryView::from(&array)?.call_method0("toreadonly")?;
+        let view = py.import("numpy")?.call_method1("asarray", (memory,))?;
         Ok(Self {
             array: array.unbind(),
-            view: read_only::<T, D>(view)?.into_any().unbind(),
+            view: view.unbind(),
         })
     }
 

@@ -9,7 +9,9 @@ use crate::tree::root;
 pub(super) type Package = (&'static str, &'static str, usize);
 
 pub(super) const PENDULARM: Package = ("", "pendularm", 100);
-pub(super) const PACKAGES: [Package; 2] = [PENDULARM, ("ros2", "pendularm_ros2", 20)];
+const ROS2: Package = ("ros2", "pendularm_ros2", 20);
+const PYTHON: Package = ("python", "_native", 10);
+pub(super) const PACKAGES: [Package; 3] = [PENDULARM, ROS2, PYTHON];
 
 /// Arrows between files, with the names that make them.
 pub(super) type Arrows = BTreeMap<(String, String), BTreeSet<String>>;
