@@ -21,7 +21,14 @@ impl<const N: usize> ArmRequest<N> for AskParameters<N> {
                 ParameterRequest::Refuse(why) => Err(why),
                 ParameterRequest::Set(change) => match arm.set(change) {
                     rejected if rejected.is_empty() => Ok(None),
-                    rejected => Err(NotSet::Rejected(rejected)),
+                    mut rejected => {
+                        if let Some(parameter) = named.parameter
+                            && let Some((_, field)) = parameter.field()
+                        {
+                            rejected.rename(field, parameter.name());
+                        }
+                        Err(NotSet::Rejected(rejected))
+                    }
                 },
             };
             (named, answer)

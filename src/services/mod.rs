@@ -54,28 +54,14 @@ pub trait Answered: Callable {
 // ---- requests whose fields are checked one by one -------------------------------------------------------------------
 
 /// A request with its valid fields and its rejections. An invalid field never prevents a valid one from taking effect.
-pub trait FieldByField: Ask {
-    /// The request with the valid fields and no rejections yet.
+pub trait FieldByField: Ask + Sized {
+    /// The request with the valid fields and the rejections.
     fn of(fields: &mut Fields<'_>) -> Self;
-
-    /// Its rejections.
-    fn rejected(&mut self) -> &mut Rejections;
-
-    /// The request with these fields.
-    #[must_use]
-    fn request(mut fields: Fields<'_>) -> Self
-    where
-        Self: Sized,
-    {
-        let mut ask = Self::of(&mut fields);
-        *ask.rejected() = fields.finish();
-        ask
-    }
 }
 
 impl<A: FieldByField> Callable for A {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        Ok(Self::request(Fields::read_or_none(arguments, service)))
+        Ok(Self::of(&mut Fields::read_or_none(arguments, service)))
     }
 }
 

@@ -273,6 +273,12 @@ impl<'a> Fields<'a> {
             .refuse(&format!("{}{name}", self.prefix), reason);
     }
 
+    /// The rejections so far.
+    #[must_use]
+    pub fn rejections(&self) -> Rejections {
+        self.rejections.clone()
+    }
+
     /// Returns the rejections after the whole request has been read.
     #[must_use]
     pub fn finish(self) -> Rejections {

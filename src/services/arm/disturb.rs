@@ -42,12 +42,8 @@ impl<const N: usize> FieldByField for Disturb<N> {
         Self {
             effort: fields.array("effort", Bound::Finite),
             duration: fields.number("duration", Bound::Positive),
-            rejected: Rejections::default(),
+            rejected: fields.rejections(),
         }
-    }
-
-    fn rejected(&mut self) -> &mut Rejections {
-        &mut self.rejected
     }
 }
 

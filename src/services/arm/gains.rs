@@ -44,12 +44,8 @@ impl<const N: usize> FieldByField for SetGains<N> {
             kp: fields.array("kp", Bound::NonNegative),
             ki: fields.array("ki", Bound::NonNegative),
             kd: fields.array("kd", Bound::NonNegative),
-            rejected: Rejections::default(),
+            rejected: fields.rejections(),
         }
-    }
-
-    fn rejected(&mut self) -> &mut Rejections {
-        &mut self.rejected
     }
 }
 

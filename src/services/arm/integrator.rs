@@ -38,12 +38,8 @@ impl FieldByField for SetIntegrator {
         Self {
             method: fields.choice("method", &Method::ALL, Method::name),
             timestep: fields.number("timestep", Bound::Positive),
-            rejected: Rejections::default(),
+            rejected: fields.rejections(),
         }
-    }
-
-    fn rejected(&mut self) -> &mut Rejections {
-        &mut self.rejected
     }
 }
 

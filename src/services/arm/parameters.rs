@@ -231,18 +231,13 @@ fn change<const N: usize>(
     parameter: Parameter,
     value: &RawValue,
 ) -> Result<ParameterChange<N>, NotSet> {
-    fn read<A: FieldByField>(fields: Fields<'_>, field: &str, parameter: Parameter) -> A {
-        let mut ask = A::request(fields);
-        ask.rejected().rename(field, parameter.name());
-        ask
-    }
     let (service, field) = parameter.field().ok_or(NotSet::Derived)?;
-    let fields = Fields::single(service, field, Some(value));
+    let fields = &mut Fields::single(service, field, Some(value));
     Ok(match service {
-        Service::SetParams => ParameterChange::Params(read(fields, field, parameter)),
-        Service::SetGains => ParameterChange::Gains(read(fields, field, parameter)),
-        Service::SetPeriod => ParameterChange::Period(read(fields, field, parameter)),
-        _ => ParameterChange::Integrator(read(fields, field, parameter)),
+        Service::SetParams => ParameterChange::Params(SetParams::of(fields)),
+        Service::SetGains => ParameterChange::Gains(SetGains::of(fields)),
+        Service::SetPeriod => ParameterChange::Period(SetPeriod::of(fields)),
+        _ => ParameterChange::Integrator(SetIntegrator::of(fields)),
     })
 }
 

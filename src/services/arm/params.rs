@@ -46,12 +46,8 @@ impl<const N: usize> FieldByField for SetParams<N> {
             gravity: fields.number("gravity", Bound::NonNegative),
             masses: fields.array("masses", Bound::Positive),
             lengths: fields.array("lengths", Bound::Positive),
-            rejected: Rejections::default(),
+            rejected: fields.rejections(),
         }
-    }
-
-    fn rejected(&mut self) -> &mut Rejections {
-        &mut self.rejected
     }
 }
 

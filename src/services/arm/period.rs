@@ -38,12 +38,8 @@ impl FieldByField for SetPeriod {
         Self {
             period: fields.number("period", Bound::NonNegative),
             delay: fields.boolean("delay"),
-            rejected: Rejections::default(),
+            rejected: fields.rejections(),
         }
-    }
-
-    fn rejected(&mut self) -> &mut Rejections {
-        &mut self.rejected
     }
 }
 

@@ -21,14 +21,10 @@ impl<const N: usize> Ask for Reset<N> {
 }
 
 impl<const N: usize> FieldByField for Reset<N> {
-    fn of(_: &mut Fields<'_>) -> Self {
+    fn of(fields: &mut Fields<'_>) -> Self {
         Self {
-            rejected: Rejections::default(),
+            rejected: fields.rejections(),
         }
-    }
-
-    fn rejected(&mut self) -> &mut Rejections {
-        &mut self.rejected
     }
 }
 

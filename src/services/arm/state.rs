@@ -29,12 +29,8 @@ impl<const N: usize> FieldByField for SetState<N> {
         Self {
             position: fields.array("position", Bound::Finite),
             velocity: fields.array("velocity", Bound::Finite),
-            rejected: Rejections::default(),
+            rejected: fields.rejections(),
         }
-    }
-
-    fn rejected(&mut self) -> &mut Rejections {
-        &mut self.rejected
     }
 }
 

@@ -66,12 +66,8 @@ impl<const N: usize> FieldByField for Step<N> {
         Self {
             steps: fields.count("steps", MAX_STEPS),
             effort: fields.array("effort", Bound::Finite),
-            rejected: Rejections::default(),
+            rejected: fields.rejections(),
         }
-    }
-
-    fn rejected(&mut self) -> &mut Rejections {
-        &mut self.rejected
     }
 }
 

@@ -36,12 +36,8 @@ impl FieldByField for Pause {
     fn of(fields: &mut Fields<'_>) -> Self {
         Self {
             paused: fields.boolean("data"),
-            rejected: Rejections::default(),
+            rejected: fields.rejections(),
         }
-    }
-
-    fn rejected(&mut self) -> &mut Rejections {
-        &mut self.rejected
     }
 }
 
@@ -68,12 +64,8 @@ impl FieldByField for Enable {
     fn of(fields: &mut Fields<'_>) -> Self {
         Self {
             enabled: fields.boolean("data"),
-            rejected: Rejections::default(),
+            rejected: fields.rejections(),
         }
-    }
-
-    fn rejected(&mut self) -> &mut Rejections {
-        &mut self.rejected
     }
 }
 
