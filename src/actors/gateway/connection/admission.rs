@@ -4,12 +4,12 @@
 //! without the token cannot block a client with the token.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use bytes::BytesMut;
 use tokio::io::AsyncRead;
-use tokio::sync::Semaphore;
+use tokio::sync::oneshot;
 use tokio::time::{Instant, timeout_at};
 
 use super::transport::read_some;
@@ -50,9 +50,12 @@ pub struct Admission {
 #[derive(Debug)]
 pub struct Slots {
     most: usize,
-    /// A semaphore without permits for each holder. It is closed when the holder is evicted.
-    taken: Mutex<VecDeque<Arc<Semaphore>>>,
+    /// A sender for each holder. It is dropped when the holder is evicted.
+    taken: Mutex<VecDeque<oneshot::Sender<()>>>,
 }
+
+/// A slot that is in use. It ends when its holder is evicted. Dropping it frees the slot.
+pub(super) type HeldSlot = oneshot::Receiver<()>;
 
 /// [`MAX_NEWCOMERS`] slots.
 impl Default for Slots {
@@ -72,48 +75,15 @@ impl Slots {
     }
 
     /// Takes a slot. Evicts the oldest holder if none is free.
-    pub(super) fn take(&self) -> HeldSlot<'_> {
-        let notice = Arc::new(Semaphore::new(0));
-        let mut taken = self.taken();
-        if taken.len() >= self.most
-            && let Some(oldest) = taken.pop_front()
-        {
-            oldest.close();
+    pub(super) fn take(&self) -> HeldSlot {
+        let (sender, slot) = oneshot::channel();
+        let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
+        taken.retain(|holder| !holder.is_closed());
+        if taken.len() >= self.most {
+            taken.pop_front();
         }
-        taken.push_back(Arc::clone(&notice));
-        HeldSlot {
-            slots: self,
-            notice,
-        }
-    }
-
-    fn taken(&self) -> MutexGuard<'_, VecDeque<Arc<Semaphore>>> {
-        self.taken.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// A slot that is in use. Dropping this frees it.
-#[derive(Debug)]
-pub(super) struct HeldSlot<'a> {
-    slots: &'a Slots,
-    notice: Arc<Semaphore>,
-}
-
-impl HeldSlot<'_> {
-    /// Ends when the holder is evicted.
-    pub(super) fn evicted(&self) -> impl Future<Output = ()> + use<> {
-        let notice = Arc::clone(&self.notice);
-        async move {
-            // The semaphore never has a permit, so this ends only when it is closed.
-            let _ = notice.acquire().await;
-        }
-    }
-}
-
-impl Drop for HeldSlot<'_> {
-    fn drop(&mut self) {
-        let mut taken = self.slots.taken();
-        taken.retain(|one| !Arc::ptr_eq(one, &self.notice));
+        taken.push_back(sender);
+        slot
     }
 }
 

@@ -18,7 +18,7 @@ use crate::protocol::op::{Incoming, Op, Verbosity};
 use crate::web::serve::{self, Gate};
 
 /// A client without a place: its slot, and the reason.
-pub(super) type Newcomer<'a> = (HeldSlot<'a>, Refused);
+pub(super) type Newcomer = (HeldSlot, Refused);
 
 /// Asks the session whether a client is admitted. The session takes only the first request of a client without a place.
 struct HttpGate<'a> {
@@ -46,7 +46,7 @@ impl ClientSession {
         stream: S,
         first: BytesMut,
         due: Instant,
-        client: Result<HeldPlace, Newcomer<'_>>,
+        client: Result<HeldPlace, Newcomer>,
     ) -> Option<Opened<S>> {
         let (mut place, newcomer) = match client {
             Ok(place) => (Some(place), None),
@@ -59,13 +59,13 @@ impl ClientSession {
         };
         // Returns the reason for an evicted client. After its request, the response has the reason instead.
         let admitting = async {
-            if let Some((slot, why)) = newcomer {
+            if let Some((mut slot, why)) = newcomer {
                 let request = tokio::select! {
                     biased;
                     request = asked.recv() => request,
-                    () = slot.evicted() => return self.turn_away(why),
+                    _ = &mut slot => return self.turn_away(why),
                 };
-                let answer = match self.wait_for_place(&slot).await {
+                let answer = match self.wait_for_place(&mut slot).await {
                     Ok(held) => {
                         place = Some(held);
                         Ok(())

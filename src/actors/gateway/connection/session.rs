@@ -95,13 +95,13 @@ impl ClientSession {
             Ok(_) => self.detect(&mut stream, &mut first, None).await,
             Err(Refused::Closed) => Detected::Json,
             Err(why) => {
-                let slot = self.admission.newcomers.take();
+                let mut slot = self.admission.newcomers.take();
                 let time = if asks_token { HEAD_TIME } else { OPENING_TIME };
                 // `biased`: a client that sends the token is admitted, even if it is evicted at the same time.
                 let how = tokio::select! {
                     biased;
                     how = self.qualify(&mut stream, &mut first, Instant::now() + time) => how,
-                    () = slot.evicted() => {
+                    _ = &mut slot => {
                         self.refuse_evicted(&mut stream, &first, why).await;
                         return None;
                     }
@@ -111,7 +111,7 @@ impl ClientSession {
                     Detected::Http(due) => {
                         return self.serve_http(stream, first, due, Err((slot, why))).await;
                     }
-                    Detected::Command => self.wait_for_place(&slot).await,
+                    Detected::Command => self.wait_for_place(&mut slot).await,
                     Detected::Json => self.connect(false).await,
                     Detected::Refused(_) | Detected::Gone => place,
                 };
@@ -165,7 +165,7 @@ impl ClientSession {
     }
 
     /// Takes a place, possibly a kept one. If none is free, waits up to [`OPENING_TIME`] for one.
-    pub(super) async fn wait_for_place(&self, slot: &HeldSlot<'_>) -> Result<HeldPlace, Refused> {
+    pub(super) async fn wait_for_place(&self, slot: &mut HeldSlot) -> Result<HeldPlace, Refused> {
         let due = Instant::now() + OPENING_TIME;
         loop {
             let place = self.connect(true).await;
@@ -173,7 +173,7 @@ impl ClientSession {
                 return place;
             }
             tokio::select! {
-                () = slot.evicted() => return place,
+                _ = &mut *slot => return place,
                 () = sleep(LOOK_AGAIN) => {}
             }
         }
