@@ -228,13 +228,12 @@ impl<S: ClientStream> Connection<S> {
     }
 
     /// The deadline of a client that takes no byte of a write. `None` if no response or long message waits, unless it
-    /// is finishing. `taken` is the time when it last took a byte of the current write.
-    fn stall_deadline(&self, taken: Option<Instant>) -> Option<Instant> {
-        let last_byte = taken.map_or(self.progress, |taken| taken.max(self.progress));
+    /// is finishing.
+    fn stall_deadline(&self) -> Option<Instant> {
         match self.responses_since {
-            Some(since) => Some(since.max(last_byte) + STALL_LIMIT),
-            None if self.is_finishing => Some(last_byte + LINGER),
-            None => self.outbox.has_long().then(|| last_byte + STALL_LIMIT),
+            Some(since) => Some(since.max(self.progress) + STALL_LIMIT),
+            None if self.is_finishing => Some(self.progress + LINGER),
+            None => self.outbox.has_long().then(|| self.progress + STALL_LIMIT),
         }
     }
 
@@ -376,8 +375,7 @@ impl ClientWriter {
                     Poll::Ready(Err(_)) => return Poll::Ready(false),
                     Poll::Pending => {}
                 }
-                let taken = transport.last_taken();
-                (client.stall_deadline(taken), None)
+                (client.stall_deadline(), None)
             } else if is_done {
                 return self.poll_end(client, cx);
             } else {

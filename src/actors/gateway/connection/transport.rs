@@ -5,12 +5,13 @@
 //! transports. At most one write and one pong of a WebSocket wait to be written.
 
 use std::io::{self, IoSlice};
+use std::iter::once;
+use std::ops::Deref;
 use std::pin::{Pin, pin};
 use std::task::{Context, Poll, ready};
 
 use bytes::{Buf, BufMut, Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
-use tokio::time::Instant;
 
 use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, READ_BYTES, WRITE_BYTES, WRITE_FRAMES};
 use crate::protocol::limits::MEDIUM;
@@ -168,12 +169,12 @@ impl<S: ClientStream> Transport<S> {
 
     // ---- sending ----------------------------------------------------------------------------------------------------
 
-    /// Sends some of `frames`, in order. Returns the number of bytes. The next call begins with the rest of a frame.
-    /// `frames` must stay the same until a call is ready.
+    /// Sends some of `frames`, in order. Returns the number of bytes. The next call begins with the rest of a frame. Over
+    /// WebSocket the number is 0 while a part of them is still to be sent. `frames` must stay the same until then.
     pub(super) fn poll_write<'a>(
         &mut self,
         cx: &mut Context<'_>,
-        frames: impl ExactSizeIterator<Item = &'a Bytes>,
+        frames: impl Iterator<Item = &'a Bytes>,
     ) -> Poll<io::Result<usize>> {
         let stream = &mut self.stream;
         match &mut self.protocol {
@@ -187,14 +188,6 @@ impl<S: ClientStream> Transport<S> {
         match &mut self.protocol {
             Protocol::Plain(_) => Poll::Ready(Ok(())),
             Protocol::WebSocket(socket, _) => socket.poll_flush(&mut self.stream, cx),
-        }
-    }
-
-    /// Time when the client last took a byte of the current write. `None` over TCP, where every write is short.
-    pub(super) fn last_taken(&self) -> Option<Instant> {
-        match &self.protocol {
-            Protocol::Plain(_) => None,
-            Protocol::WebSocket(socket, _) => Some(socket.taken),
         }
     }
 
@@ -227,10 +220,10 @@ pub(super) async fn read_some<S: AsyncRead + Unpin>(
 }
 
 /// Writes some of `frames`, in order. Returns the number of bytes.
-fn write_some<'a, S: AsyncWrite + Unpin>(
+fn write_some<'a, S: AsyncWrite + Unpin, B: Deref<Target = [u8]> + 'a>(
     stream: &mut S,
     cx: &mut Context<'_>,
-    frames: impl ExactSizeIterator<Item = &'a Bytes>,
+    frames: impl Iterator<Item = &'a B>,
 ) -> Poll<io::Result<usize>> {
     let mut slices = [IoSlice::new(&[]); WRITE_FRAMES];
     let mut room = WRITE_BYTES;
@@ -267,8 +260,6 @@ struct WebSocket {
     unfinished: Option<u8>,
     /// Bytes of the writer's frames in `output`.
     unflushed: usize,
-    /// Time when the peer last took a byte.
-    taken: Instant,
     /// The close reason for the peer.
     close_reason: (Option<u16>, &'static str),
     /// The peer has closed, and accepts only a close frame.
@@ -284,7 +275,6 @@ impl WebSocket {
             output: BytesMut::new(),
             unfinished: None,
             unflushed: 0,
-            taken: Instant::now(),
             close_reason: (Some(GOING_AWAY), "shutting down"),
             is_closed: false,
             is_closing: false,
@@ -324,12 +314,26 @@ impl WebSocket {
             ready!(self.poll_close(stream, cx))?;
             return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
         }
-        ready!(self.poll_flush(stream, cx))?;
         if self.unflushed == 0 {
-            self.unflushed = self.put_frames(frames);
             ready!(self.poll_flush(stream, cx))?;
+            self.unflushed = self.put_frames(frames);
+        }
+        ready!(self.poll_output(stream, cx))?;
+        if !self.output.is_empty() {
+            return Poll::Ready(Ok(0));
         }
         Poll::Ready(Ok(std::mem::take(&mut self.unflushed)))
+    }
+
+    /// Sends a part of the queued frames.
+    fn poll_output<S: AsyncWrite + Unpin>(
+        &mut self,
+        stream: &mut S,
+        cx: &mut Context<'_>,
+    ) -> Poll<io::Result<()>> {
+        let sent = ready!(write_some(stream, cx, once(&self.output)))?;
+        self.output.advance(sent);
+        Poll::Ready(Ok(()))
     }
 
     fn put_frames<'a>(&mut self, frames: impl Iterator<Item = &'a Bytes>) -> usize {
@@ -374,11 +378,7 @@ impl WebSocket {
                     None => return Poll::Ready(Ok(())),
                 }
             }
-            match ready!(Pin::new(&mut *stream).poll_write(cx, &self.output))? {
-                0 => return Poll::Ready(Err(io::ErrorKind::WriteZero.into())),
-                taken => self.output.advance(taken),
-            }
-            self.taken = Instant::now();
+            ready!(self.poll_output(stream, cx))?;
         }
     }
 
