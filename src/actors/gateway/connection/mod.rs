@@ -73,7 +73,6 @@ impl<S: ClientStream> Connection<S> {
             let connection = Self::new(ends, unread, registry, gauges);
             let outlets = Outlets {
                 mailbox: ctx.address().recipient(),
-                gone: Arc::default(),
                 backlog: Arc::clone(&connection.backlog),
             };
             let session = ClientSession {

@@ -20,7 +20,7 @@ use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 use std::fmt::Display;
 use std::net::IpAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -201,7 +201,7 @@ impl Handler<Connect> for Registry {
         let link = ClientLink {
             registry: ctx.address().recipient(),
             connection: id,
-            gone: Arc::clone(&connect.outlets.gone),
+            gone: Arc::default(),
         };
         let client = Client::new(connect.outlets, connect.from, link);
         self.clients.insert(id, client);
@@ -238,7 +238,7 @@ impl Handler<Disconnect> for Registry {
         self.withdraw(id);
         self.requests.forget_caller(id);
         if let Some(client) = self.clients.remove(&id) {
-            client.outlets.gone.store(true, Ordering::Relaxed);
+            client.link.gone.store(true, Ordering::Relaxed);
             self.gauges.set_connections(self.clients.len() as u64);
         }
         self.schedule_cleanup(ctx);
@@ -617,8 +617,6 @@ pub struct CountRefusal;
 pub struct Outlets {
     /// Its mailbox.
     pub mailbox: Recipient<ToClient>,
-    /// Set when the client has disconnected. Heavy computations for it stop.
-    pub gone: Arc<AtomicBool>,
     /// Bytes of responses that wait to be written. The connection updates the number.
     pub backlog: Arc<AtomicUsize>,
 }
