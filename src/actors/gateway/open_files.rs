@@ -80,32 +80,24 @@ pub fn room_with(files: usize, wanted_clients: usize, asks_token: bool) -> Room 
 mod tests {
     use super::*;
 
-    /// More than the usual limit of 1,024 files.
-    const WANTED: usize = 2000;
-
-    fn clients_with(files: usize) -> usize {
-        room_with(files, WANTED, false).clients
-    }
-
     #[test]
-    fn there_are_files_for_every_client_that_is_served() {
-        assert_eq!(clients_with(usize::MAX), WANTED);
-        assert_eq!(clients_with(WANTED + OTHER_FILES), WANTED);
-        assert_eq!(clients_with(1024), 1024 - OTHER_FILES);
-        assert_eq!(clients_with(40), 8);
-        assert_eq!(clients_with(3), 1);
-    }
-
-    #[test]
-    fn there_are_files_for_unauthenticated_clients_too() {
-        for (files, clients, newcomers) in [
-            (usize::MAX, WANTED, MAX_NEWCOMERS),
-            (1024, 1024 - OTHER_FILES - MAX_NEWCOMERS, MAX_NEWCOMERS),
-            (64, 16, 16),
-            (3, 1, 1),
+    fn there_are_files_for_every_client_that_is_served_and_for_unauthenticated_ones() {
+        /// More than the usual limit of 1,024 files allows.
+        const WANTED: usize = 2000;
+        const USUAL: usize = 1024 - OTHER_FILES;
+        for (files, asks_token, clients, newcomers) in [
+            (usize::MAX, false, WANTED, MAX_NEWCOMERS),
+            (WANTED + OTHER_FILES, false, WANTED, MAX_NEWCOMERS),
+            (1024, false, USUAL, MAX_NEWCOMERS),
+            (40, false, 8, MAX_NEWCOMERS),
+            (3, false, 1, MAX_NEWCOMERS),
+            (usize::MAX, true, WANTED, MAX_NEWCOMERS),
+            (1024, true, USUAL - MAX_NEWCOMERS, MAX_NEWCOMERS),
+            (64, true, 16, 16),
+            (3, true, 1, 1),
         ] {
-            let room = room_with(files, WANTED, true);
-            assert_eq!((room.clients, room.newcomers), (clients, newcomers));
+            let room = Room { clients, newcomers };
+            assert_eq!(room_with(files, WANTED, asks_token), room);
         }
     }
 }
