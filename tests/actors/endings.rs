@@ -93,7 +93,7 @@ fn goals_of_a_disconnected_action_server() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_caller_that_has_stopped_sending_is_kept_until_its_socket_is_closed() {
-    use std::net::{TcpListener, TcpStream};
+    use std::net::{Shutdown, TcpListener, TcpStream};
     use std::sync::Arc;
 
     use pendularm::actors::gateway::connection::{Connection, Ends};
@@ -109,16 +109,12 @@ fn a_caller_that_has_stopped_sending_is_kept_until_its_socket_is_closed() {
         let local = accepted.local_addr().unwrap();
         let (mut caller, theirs) = duplex(WIDE);
         let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
-        Connection::start_with(
-            Arc::default(),
-            Ends { local, peer },
-            theirs,
-            registry,
-            gauges,
-        );
+        let ends = Ends { local, peer };
+        Connection::start_with(Arc::default(), ends, theirs, registry, gauges);
         let call = format!("{}\n", call(1));
         caller.write_all(call.as_bytes()).await.unwrap();
         caller.shutdown().await.unwrap();
+        socket.shutdown(Shutdown::Write).unwrap();
         provider.receive().await;
         sleep(Duration::from_secs(5)).await;
         assert_eq!(gateway.gauges.connections(), 2, "it may still read");
