@@ -41,7 +41,7 @@ for layer in "${layers[@]}"; do
             more+=(--cargo-arg=--lib -- -- --skip default_gains) ;;
         protocol) quick=("$plain" "${more[@]}" --cargo-arg={--lib,--test=protocol})
             more=("$plain" "${more[@]}" --cargo-arg=--test=actors -- -- --skip arm_steps --skip kernel::every --skip pacing --skip study) ;;
-        actors) folders+=(live services web) more+=(--cargo-arg={--lib,--test=actors,--test=wire}) ;;
+        actors) folders+=(live services web) more+=(--cargo-arg={--lib,--test=actors,--test=protocol,--test=study,--test=wire}) ;;
     esac
     if [ -n "$check" ]; then
         printf '%s\n' "${quick[@]}" "${more[@]}" | sed -nE 's/^--cargo-arg=(--(package|lib|test))/\1/p' |

@@ -48,8 +48,14 @@ fn computations_that_fit_only_after_one_another_wait_for_one_another() {
         let workers = WorkerPool::start(2).unwrap();
         // Memory for one answer of 10,000 steps at a time, and for a short one in addition.
         let gateway = computing(MIB, &workers).await;
-        let mut clients: Vec<Peer> = (0..12).map(|_| gateway.connect(WIDE)).collect();
-        for client in &mut clients {
+        // The first answer fits into no pipe, so it keeps its memory, more than 32 parts of it, until it is read.
+        let pipes = [SHORT].into_iter().chain([WIDE; 11]);
+        let mut clients: Vec<Peer> = pipes.map(|size| gateway.connect(size)).collect();
+        ask_steps(&mut clients[0], 10_000).await;
+        while gateway.gauges.memory().taken() < 32 {
+            sleep(Duration::from_millis(1)).await;
+        }
+        for client in &mut clients[1..] {
             ask_steps(client, 10_000).await;
         }
         let mut light = gateway.connect(WIDE);

@@ -132,14 +132,7 @@ fn an_unread_log_blocks_no_client_and_lost_lines_are_counted() {
     const CLIENTS: usize = 2 * QUEUE_LINES + 64 * 1024 / 50;
     for format in ["text", "json"] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_pendularm"))
-            .args([
-                "--bind",
-                "127.0.0.1:0",
-                "--log",
-                "debug",
-                "--clients",
-                "4096",
-            ])
+            .args("--bind 127.0.0.1:0 --log debug --clients 4096".split(' '))
             .args(["--log-format", format])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
