@@ -137,10 +137,8 @@ fn each_message_has_the_whole_time_to_come() {
             stream.write_all(message).unwrap();
         }
     });
-    let (status, out, complaint) = end(start(
-        &[&ECHO[..], &["--timeout", "5", "-n", "5"]].concat(),
-        &address,
-    ));
+    let arguments = [&ECHO[..], &["--timeout", "5", "-n", "5"]].concat();
+    let (status, out, complaint) = end(start(&arguments, &address));
     assert_eq!((status, complaint.as_str()), (Some(0), ""));
     assert_eq!(out, "1\n---\n".repeat(5));
 }
