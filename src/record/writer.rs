@@ -67,6 +67,8 @@ pub struct McapWriter<W: Write> {
     writer: Writer<NoSeek<W>>,
     channels: HashMap<&'static str, Channel>,
     messages: u64,
+    /// The latest time of an entry. An entry of another thread may come after one with a later time.
+    latest: u64,
 }
 
 struct Channel {
@@ -128,15 +130,17 @@ impl<W: Write> McapWriter<W> {
             writer,
             channels: HashMap::new(),
             messages: 0,
+            latest: 0,
         })
     }
 
-    /// Writes an entry.
+    /// Writes an entry. Its time is at least that of the entry before.
     ///
     /// # Errors
     /// If the file cannot be written, or the entry is not valid.
     pub fn write(&mut self, entry: &RecordEntry) -> Result<(), RecordError> {
-        let at = entry.log_time;
+        self.latest = self.latest.max(entry.log_time);
+        let at = self.latest;
         match &entry.content {
             Content::Published { topic, frame } => {
                 let frame: PublishFrame = serde_json::from_slice(frame)?;

@@ -90,7 +90,7 @@ fn a_run_is_recorded_whole_and_replayed() {
         assert!(passages.iter().any(|one| one.topic == topic), "{topic}");
     }
     let times = passages.iter().map(|one| u128::from(one.log_time));
-    assert!(times.clone().all(|time| time > began));
+    assert!(times.clone().is_sorted() && times.clone().all(|time| time > began));
     assert!(times.max() < Some(time_of_day()));
     assert_qos(&file);
     let verdict = replay(File::open(&file).unwrap()).unwrap();
