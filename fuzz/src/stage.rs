@@ -18,7 +18,7 @@ use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::{Caller, Interest, Nodes, Publish, Route, ServiceCall, TopicMessage};
-use pendularm::actors::nodes::start_in_this_thread;
+use pendularm::actors::start::start_in_this_thread;
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::memory::Memory;
 use pendularm::options::Links;

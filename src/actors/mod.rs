@@ -25,13 +25,13 @@ pub mod arm;
 pub mod compute;
 pub mod gateway;
 pub mod node;
-pub mod nodes;
 pub mod panics;
 #[cfg(feature = "record")]
 pub mod recorder;
 pub mod resources;
 pub mod ros;
 pub mod runtime;
+pub mod start;
 
 /// Identifies one client connection during the life of the process. It is never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

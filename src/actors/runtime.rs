@@ -24,13 +24,13 @@ use crate::actors::gateway::listener;
 use crate::actors::gateway::open_files;
 use crate::actors::gateway::registry::{Attach, FinishAll, RefuseCalls, Registry};
 use crate::actors::node::{Nodes, ShutDown};
-use crate::actors::nodes;
 use crate::actors::panics::contain;
 #[cfg(feature = "record")]
 use crate::actors::recorder::{self, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::priority::lower_priority;
 use crate::actors::ros::rosout::Rosout;
+use crate::actors::start;
 #[cfg(feature = "web")]
 use crate::address::Host;
 use crate::math::arm::Arm;
@@ -228,7 +228,7 @@ fn start_nodes<const N: usize>(
     let arm = ArmSim::<N>::start_in_arbiter(&arm_thread.handle(), move |_| {
         ArmSim::new(Arm::default(), Gains::default(), publish, gauges).with_period(period)
     });
-    let busy = nodes::start_nodes(&arm, registry, workers, seed, nodes);
+    let busy = start::start_nodes(&arm, registry, workers, seed, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
     Rosout::attach(&rosout.start(), nodes);
     #[cfg(feature = "record")]

@@ -79,7 +79,7 @@ impl TypedValue {
 /// The verbs for topics, services, actions and nodes.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum GraphVerb {
-    /// List their names
+    /// List the names
     List {
         /// Show the types (nodes have none)
         #[arg(short = 't', long)]

@@ -14,7 +14,7 @@ use crate::protocol::catalog::Topic;
 const SHORTEST_WINDOW: Duration = Duration::from_millis(250);
 
 /// Counts between two messages of `/diagnostics`, and the topics with subscribers.
-pub(crate) struct Telemetry {
+pub(crate) struct Counts {
     wanted: Vec<Topic>,
     /// Publishing ticks so far.
     pub(crate) ticks: u64,
@@ -58,7 +58,7 @@ pub(crate) struct Rates {
     pub(crate) steps_per_second: f64,
 }
 
-impl Telemetry {
+impl Counts {
     pub(crate) fn new<const N: usize>(now: Duration, simulation: &Simulation<N>) -> Self {
         Self {
             wanted: Vec::new(),

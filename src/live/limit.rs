@@ -86,7 +86,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     }
 
     fn wants_limit(&self) -> bool {
-        self.telemetry.wants(Topic::Diagnostics) || self.telemetry.wants(Topic::ErrorEstimate)
+        self.counts.wants(Topic::Diagnostics) || self.counts.wants(Topic::ErrorEstimate)
     }
 
     /// The latest predictions \[s\], of the timestep and of the control period: infinite if nothing limits, NaN

@@ -23,7 +23,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
-use self::counts::Telemetry;
+use self::counts::Counts;
 use self::goals::Goals;
 use self::limit_watch::LimitWatch;
 use crate::math::arm::Arm;
@@ -84,7 +84,7 @@ pub struct LiveArm<const N: usize, W> {
     pub(crate) paused_at: f64,
     /// Whether steps are due that a wake-up after a [`STEP_PAUSE`] will take.
     catching_up: bool,
-    pub(crate) telemetry: Telemetry,
+    pub(crate) counts: Counts,
     pub(crate) goals: Goals<N>,
     limit: LimitWatch<N>,
     /// The journal of the steps' inputs, if there is one.
@@ -98,7 +98,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         let simulation = Simulation::new(arm, gains);
         Self {
             pacer: Pacer::new(world.now(), simulation.timestep()),
-            telemetry: Telemetry::new(world.now(), &simulation),
+            counts: Counts::new(world.now(), &simulation),
             world,
             simulation,
             paused: false,
@@ -140,7 +140,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
 
     /// Sets whether a topic of the arm has subscribers.
     pub fn set_wanted(&mut self, topic: Topic, wanted: bool) {
-        self.telemetry.set_wanted(topic, wanted);
+        self.counts.set_wanted(topic, wanted);
         self.publish_lasting(topic);
     }
 
@@ -168,7 +168,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
         self.catching_up = taken < due;
         let behind = self.catching_up.then(|| self.pacer.behind(now));
-        self.telemetry.behind = behind.unwrap_or_default();
+        self.counts.behind = behind.unwrap_or_default();
         self.catching_up
     }
 
@@ -190,7 +190,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             }
         }
         let spent = self.spent_since(started);
-        self.telemetry
+        self.counts
             .stepped(taken, spent, self.simulation.timestep());
         taken
     }
@@ -204,7 +204,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         if let Some(journal) = &mut self.journal {
             journal.diverge(&self.simulation);
         }
-        self.telemetry.behind = 0.0;
+        self.counts.behind = 0.0;
         if let Some(divergence) = self.simulation.divergence() {
             self.world.note_divergence(divergence);
         }
@@ -213,7 +213,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
 
     /// Time counts from here. The fraction of an unfinished step is dropped.
     pub(crate) fn restart_pacer(&mut self) {
-        self.telemetry.behind = 0.0;
+        self.counts.behind = 0.0;
         self.pacer
             .restart(self.world.now(), self.simulation.timestep());
     }

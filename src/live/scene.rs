@@ -13,7 +13,7 @@ use crate::services::arm::joint_names;
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
     /// Publishes `/tf`, if it has subscribers.
     pub(super) fn publish_transforms(&self, stamp: Stamp) {
-        if self.telemetry.wants(Topic::Tf) {
+        if self.counts.wants(Topic::Tf) {
             let lengths = *self.simulation.arm().lengths();
             let positions = self.simulation.state().position;
             self.publish(Topic::Tf, move || {
@@ -36,7 +36,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
 
     /// Publishes a message that stays valid until the next one, if the topic has subscribers.
     pub(super) fn publish_lasting(&self, topic: Topic) {
-        if !self.telemetry.wants(topic) {
+        if !self.counts.wants(topic) {
             return;
         }
         let arm = *self.simulation.arm();

@@ -29,41 +29,41 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     }
 
     fn publish_state(&mut self) {
-        self.telemetry.ticks += 1;
+        self.counts.ticks += 1;
         let stamp = Stamp::from_seconds(self.simulation.time());
-        if self.telemetry.wants(Topic::JointStates) {
+        if self.counts.wants(Topic::JointStates) {
             self.publish_joint_state(stamp);
         }
-        if self.telemetry.wants(Topic::Clock) {
+        if self.counts.wants(Topic::Clock) {
             self.publish(Topic::Clock, move || Clock { clock: stamp });
         }
         self.publish_transforms(stamp);
-        if self.telemetry.wants(Topic::ErrorEstimate)
-            && self.telemetry.ticks.is_multiple_of(ESTIMATE_TICKS)
+        if self.counts.wants(Topic::ErrorEstimate)
+            && self.counts.ticks.is_multiple_of(ESTIMATE_TICKS)
         {
             let estimate = self.error_estimate();
             self.publish(Topic::ErrorEstimate, move || estimate);
         }
-        if self.telemetry.ticks.is_multiple_of(u64::from(PUBLISH_RATE)) {
+        if self.counts.ticks.is_multiple_of(u64::from(PUBLISH_RATE)) {
             self.publish_diagnostics();
             let now = self.world.now();
-            self.telemetry.last_rates = self.telemetry.window.rates(now).unwrap_or_default();
-            self.telemetry.window = Window::new(now);
+            self.counts.last_rates = self.counts.window.rates(now).unwrap_or_default();
+            self.counts.window = Window::new(now);
         }
     }
 
     /// Publishes `/diagnostics`, if it has subscribers.
     pub(super) fn publish_diagnostics(&mut self) {
-        if self.telemetry.wants(Topic::Diagnostics) {
+        if self.counts.wants(Topic::Diagnostics) {
             let diagnostics = self.diagnostics();
             self.publish(Topic::Diagnostics, move || diagnostics);
-            self.telemetry.window.longest = WakeUp::default();
+            self.counts.window.longest = WakeUp::default();
         }
     }
 
     /// Measures the drift from the present energy.
     pub(super) fn restart_energy_drift(&mut self) {
-        self.telemetry.energy_reference = energy(&self.simulation);
+        self.counts.energy_reference = energy(&self.simulation);
     }
 
     /// Publishes the message of `make`, which is called when the frame is written.
@@ -118,17 +118,17 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         };
         let energy = energy(&self.simulation);
         let rates = self
-            .telemetry
+            .counts
             .window
             .rates(self.world.now())
-            .unwrap_or(self.telemetry.last_rates);
+            .unwrap_or(self.counts.last_rates);
         let numbers = [
             ("sim_time", self.simulation.time()),
             ("real_time_factor", rates.real_time_factor),
             ("steps_per_second", rates.steps_per_second),
             ("energy", energy),
-            ("energy_drift", energy - self.telemetry.energy_reference),
-            ("max_step_time", self.telemetry.window.longest.step_time()),
+            ("energy_drift", energy - self.counts.energy_reference),
+            ("max_step_time", self.counts.window.longest.step_time()),
             ("control_period", self.effective_period()),
             ("control_period_limit", self.period_limit()),
             ("timestep_limit", self.timestep_limit()),
@@ -151,7 +151,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
 
     /// Warnings about a running arm.
     fn warnings(&self) -> Vec<String> {
-        let lags = !self.paused && self.telemetry.lags();
+        let lags = !self.paused && self.counts.lags();
         let late = lags.then(|| {
             let behind = CATCH_UP.as_millis() / 2;
             format!("the arm is more than {behind} ms behind wall time")

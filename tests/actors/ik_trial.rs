@@ -17,7 +17,7 @@ use pendularm::actors::arm::sim::{ArmPose, GoalProgress, Pose};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::node::Barrier;
 use pendularm::actors::node::Call;
-use pendularm::actors::nodes::start_goal_nodes;
+use pendularm::actors::start::start_goal_nodes;
 use pendularm::math::goal::Outcome;
 use pendularm::math::kinematics::{Target, Unreachable};
 use pendularm::math::trial::Changes;

@@ -8,8 +8,8 @@ use pendularm::actors::arm::sim::ArmSim;
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::Nodes;
-use pendularm::actors::nodes::start_arm;
 use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::start::start_arm;
 
 /// Starts all nodes and hands them to the registry. Computations wait for the turns of the pool.
 pub async fn start_whole<const N: usize>(

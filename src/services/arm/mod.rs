@@ -10,9 +10,9 @@ mod gains;
 mod integrator;
 mod messages;
 mod parameters;
-mod params;
 mod period;
 mod reset;
+mod set_params;
 mod state;
 mod step;
 mod switches;
@@ -27,9 +27,9 @@ pub use self::parameters::{
     AskParameters, NamedParameter, NotSet, ParameterChange, ParameterRequest, ParameterValue,
     parameter_services,
 };
-pub use self::params::SetParams;
 pub use self::period::{PeriodInForce, SetPeriod};
 pub use self::reset::Reset;
+pub use self::set_params::SetParams;
 pub use self::state::SetState;
 pub use self::step::{MAX_STEPS, STEPS_IN_A_ROW, Step, Stepped, StepsEnd};
 pub use self::switches::{Enable, Pause};
