@@ -585,7 +585,7 @@ pub struct ForwardGoal<G> {
     pub done: Done,
 }
 
-/// Cancels the goal that the same client has sent under this id. From clients, by the action.
+/// Cancels the goal that the same client has sent under this id, or all goals of the action. From clients, by the action.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct CancelSent {
@@ -593,6 +593,8 @@ pub struct CancelSent {
     pub link: ClientLink,
     /// The goal's id, if it has one.
     pub id: Option<Payload>,
+    /// Whether all goals are cancelled, whoever sent them.
+    pub all: bool,
     /// Dropped when the goal has ended.
     pub done: Done,
 }
@@ -613,12 +615,14 @@ impl CancelSent {
     /// Whether it is about the goal of this client.
     #[must_use]
     pub fn is_of(&self, client: &ActionClient) -> bool {
-        self.link.connection == client.link.connection && self.id == client.id
+        self.all || (self.link.connection == client.link.connection && self.id == client.id)
     }
 
-    /// Sends the reason why no goal was cancelled.
+    /// Sends the reason why the goal was not cancelled.
     pub fn refuse(&self, why: &str) {
-        self.link.status(Level::Error, why, self.id.as_ref());
+        if !self.all {
+            self.link.status(Level::Error, why, self.id.as_ref());
+        }
     }
 }
 

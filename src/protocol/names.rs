@@ -35,6 +35,12 @@ pub fn relative(name: &str) -> &str {
         .unwrap_or(name)
 }
 
+/// The action whose goals this service of ROS 2 cancels.
+#[must_use]
+pub fn cancelled_action(service: &str) -> Option<&str> {
+    service.strip_suffix("/_action/cancel_goal")
+}
+
 /// Every spelling of an absolute name, the absolute name first.
 pub fn spellings(name: &str) -> impl Iterator<Item = &str> {
     let short = Some(relative(name)).filter(|short| *short != name);

@@ -193,7 +193,7 @@ impl<const N: usize> Handler<CancelSent> for IkAction<N> {
     fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
         let is_meant = |goal: &&ActiveGoal<N>| match &goal.owner {
             Some(GoalOwner::Client(client)) => cancel.is_of(client),
-            _ => false,
+            _ => cancel.all,
         };
         let Some(goal) = self.active.as_ref().filter(is_meant) else {
             return cancel.refuse(NOT_ACTIVE);

@@ -32,6 +32,8 @@ pub(super) struct Forwarded {
     pub(super) spelling: Option<Box<str>>,
     /// Whether the sender of a goal gets feedback.
     pub(super) wants_feedback: bool,
+    /// Whether a goal was cancelled with all others of its action. Its server is told once.
+    pub(super) is_cancelled: bool,
     /// A caller that has stopped sending is removed when its last call has ended.
     pub(super) _done: Option<Done>,
     /// Its part of the caller's limit [`MAX_KEPT`](crate::actors::gateway::limits::MAX_KEPT).
@@ -143,6 +145,26 @@ impl Requests {
         let (number, request) =
             requests.find(|(_, one)| one.id.as_ref() == id && names::are_same(&one.name, name))?;
         Some((own_id(number), request))
+    }
+
+    /// Marks the goals of an action at `provider` as cancelled, oldest first and at most `limit`. Returns their ids there.
+    /// A goal is returned only once.
+    pub(super) fn cancel_all(
+        &mut self,
+        action: &str,
+        provider: ConnectionId,
+        limit: usize,
+    ) -> Vec<String> {
+        let numbers = self.numbers(RequestKey::Provider(provider, Served::Action));
+        let is_left = |goal: &Forwarded| !goal.is_cancelled && names::are_same(&goal.name, action);
+        let left = numbers.filter(|number| self.get(*number).is_some_and(is_left));
+        let left: Vec<u64> = left.take(limit).collect();
+        for number in &left {
+            if let Some(goal) = self.outstanding.get_mut(number) {
+                goal.is_cancelled = true;
+            }
+        }
+        left.into_iter().map(own_id).collect()
     }
 
     pub(super) fn get(&self, number: u64) -> Option<&Forwarded> {

@@ -50,6 +50,10 @@ pub(super) enum Refusal {
     CallerBusy(String),
     #[error("id: no goal of {0} with this id was sent by this connection")]
     NoGoal(String),
+    #[error(
+        "goal_info must be left out: this service cancels all goals of its action, and cancel_action_goal one of them"
+    )]
+    OneGoal,
     #[error("action: no action is called {0}")]
     NoAction(String),
     #[error("action_type must be {0}")]

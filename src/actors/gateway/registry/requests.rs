@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 use bytes::Bytes;
+use serde_json::json;
 use tokio::time::{Instant, sleep_until};
 
 use super::forwarded::Forwarded;
@@ -19,7 +20,7 @@ use crate::actors::node::{
 use crate::actors::resources::memory::cover_message;
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
-use crate::protocol::names;
+use crate::protocol::names::{self, OWN_ID_PREFIX};
 use crate::protocol::op::fields::mistyped;
 use crate::protocol::op::{
     ActionGoal, Arguments, CallService, GoalStatus, Problem, ProviderOp, Served,
@@ -29,6 +30,8 @@ use crate::services::{Address, NoService};
 
 /// Calls and goals ended per cleanup, which takes a third of a millisecond.
 const ENDED_IN_A_ROW: usize = 128;
+/// Most digits of a request's number.
+const ID_DIGITS: usize = 20;
 
 // ---- to the runtime's own nodes -------------------------------------------------------------------------------------
 
@@ -44,6 +47,12 @@ impl Registry {
         let refusal = match (self.closed, own) {
             (Some(why), _) => Err(Refusal::Closed(why)),
             (None, Some(service)) => return self.call_node(service, origin, call),
+            (None, None) if self.action_to_cancel(&call.service).is_some() => {
+                match self.cancel_all_goals(&origin, &call) {
+                    Ok(handled) => return handled,
+                    Err(why) => Err(why),
+                }
+            }
             (None, None) => {
                 let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
                 let (kind, args) = (Served::Service, &call.args);
@@ -162,9 +171,59 @@ impl Registry {
         node(ActionRequest::Cancel(CancelSent {
             link: client.link.clone(),
             id: origin.id,
+            all: false,
             done,
         }));
         Handled::with(ended)
+    }
+
+    /// The action whose goals a call of this service cancels, unless a client provides the service itself.
+    fn action_to_cancel<'a>(&self, service: &'a str) -> Option<&'a str> {
+        let action = names::cancelled_action(service)?;
+        let has = |kind, name| {
+            self.directory
+                .provider(kind, &names::absolute(name))
+                .is_some()
+        };
+        let is_known = Action::from_name(action).is_some() || has(Served::Action, action);
+        (is_known && !has(Served::Service, service)).then_some(action)
+    }
+
+    /// Cancels all goals of an action, whoever sent them, as the service of ROS 2 does. The goals end after the answer.
+    fn cancel_all_goals(
+        &mut self,
+        origin: &FrameOrigin,
+        call: &CallService,
+    ) -> Result<Handled, Refusal> {
+        let no_action = || NoService::NoProvider(call.service.clone());
+        let action = names::cancelled_action(&call.service).ok_or_else(no_action)?;
+        if !call.args.get().bytes().all(|byte| b"{}[] ".contains(&byte)) {
+            return Err(Refusal::OneGoal);
+        }
+        let client = self.clients.get(&origin.from).ok_or_else(no_action)?;
+        let link = client.link.clone();
+        let own = Action::from_name(action).and_then(|action| self.nodes.actions.get(&action));
+        let handled = if let Some(node) = own {
+            let (done, ended) = guard();
+            let (id, all) = (None, true);
+            node(ActionRequest::Cancel(CancelSent {
+                link,
+                id,
+                all,
+                done,
+            }));
+            Handled::with(ended)
+        } else {
+            self.forward_all_cancellations(action)?;
+            Handled::at_once()
+        };
+        let values = json!({"return_code": 0, "goals_canceling": []});
+        let id = origin.id.as_ref();
+        let frame = messages::response(&call.service, id, &values, true, "");
+        if let Some(client) = self.clients.get(&origin.from) {
+            client.send(self.covered(frame));
+        }
+        Ok(handled)
     }
 }
 
@@ -214,7 +273,10 @@ impl Registry {
         type_name: Option<&str>,
     ) -> Result<(), Refusal> {
         let is_own = match kind {
-            Served::Service => Service::from_name(spelling).is_some(),
+            Served::Service => {
+                let action = names::cancelled_action(spelling).and_then(Action::from_name);
+                Service::from_name(spelling).is_some() || action.is_some()
+            }
             Served::Action => Action::from_name(spelling).is_some(),
         };
         if is_own {
@@ -303,6 +365,7 @@ impl Registry {
             deadline,
             spelling,
             wants_feedback,
+            is_cancelled: false,
             _done: done,
             _entry: caller.kept.enter(bytes, None)?,
         });
@@ -328,6 +391,28 @@ impl Registry {
                 return Err(Refusal::ProviderBusy(action.to_owned()));
             }
             server.send(messages::cancellation(spelling, &id));
+        }
+        Ok(())
+    }
+
+    /// Forwards the cancellation of all goals of an action, as far as its server reads.
+    fn forward_all_cancellations(&mut self, action: &str) -> Result<(), Refusal> {
+        let provider = self
+            .directory
+            .provider(Served::Action, &names::absolute(action));
+        let server = provider.and_then(|one| Some((one, self.clients.get(&one.connection)?)));
+        let Some((provider, server)) = server else {
+            return Err(Refusal::NoAction(action.to_owned()));
+        };
+        let spelling = &*provider.spelling;
+        let length = messages::cancellation(spelling, OWN_ID_PREFIX).len() + ID_DIGITS;
+        let room = MAX_BACKLOG.saturating_sub(server.backlog()) / length;
+        let ids = self.requests.cancel_all(action, provider.connection, room);
+        for id in &ids {
+            server.send(messages::cancellation(spelling, id));
+        }
+        if ids.len() == room {
+            return Err(Refusal::ProviderBusy(action.to_owned()));
         }
         Ok(())
     }

@@ -178,11 +178,16 @@ impl<const N: usize> Handler<CancelSent> for TfRepublisher<N> {
             FrameReceiver::Client(client) => cancel.is_of(client),
             FrameReceiver::Topic { .. } => false,
         };
-        let mut all = self.subscriptions.iter();
-        let at = all.position(|(subscription, _)| is_meant(subscription));
-        match at.and_then(|at| self.subscriptions.remove(at)) {
-            Some((subscription, _)) => subscription.end(GoalStatus::Canceled, None),
-            None => cancel.refuse(NOT_KEPT),
+        loop {
+            let mut all = self.subscriptions.iter();
+            let at = all.position(|(subscription, _)| is_meant(subscription));
+            match at.and_then(|at| self.subscriptions.remove(at)) {
+                Some((subscription, _)) => subscription.end(GoalStatus::Canceled, None),
+                None => break cancel.refuse(NOT_KEPT),
+            }
+            if !cancel.all {
+                break;
+            }
         }
         self.keep_timer(ctx);
     }
