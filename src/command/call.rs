@@ -27,10 +27,10 @@ const ROS_1: [(&str, &str); 3] = [("secs", "sec"), ("nsecs", "nanosec"), ("seq",
 /// A type and a value of that type, both optional.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct TypedValue {
-    /// Its type, as pkg/Name; optional, and checked if given
+    /// Type, as pkg/Name; optional, and checked if given
     #[arg(value_name = "TYPE")]
     type_name: Option<String>,
-    /// The value, in JSON or YAML; {} by default
+    /// Value, in JSON or YAML; {} by default
     value: Option<String>,
 }
 
@@ -81,13 +81,13 @@ impl TypedValue {
 pub enum GraphVerb {
     /// List the names
     List {
-        /// Show the types (nodes have none)
+        /// Show the types; nodes have none
         #[arg(short = 't', long)]
         show_types: bool,
     },
-    /// Describe one: the type and the nodes of a topic, service or action; the topics and services of a node
+    /// Describe a topic, service, action or node
     Info {
-        /// Its name, with or without the leading slash
+        /// Name, with or without the leading slash
         name: String,
     },
 }
@@ -104,9 +104,9 @@ Examples:
   pendularm service call /arm_sim/set_integrator '{method: rk4, timestep: 0.002}'
   pendularm service call --json /study/stability | jq .timestep_limit_held
 
-Give the fields by name, or all of them in order.")]
+VALUE has the fields by name, or all fields in order.")]
     Call {
-        /// Its name, with or without the leading slash
+        /// Name, with or without the leading slash
         service: String,
         #[command(flatten)]
         args: TypedValue,
@@ -128,11 +128,11 @@ Examples:
   pendularm action send_goal /ik_action '{x: 1.2, y: 0.5}' --feedback
   pendularm action send_goal --json /ik_action pendularm_interfaces/action/MoveTo '{\"x\": 1.2, \"y\": 0.5}'
 
-It prints `result` and `status`, and before them each `feedback` with --feedback. The first SIGINT cancels the goal and
-waits for its end. The second one ends the command. Exit status: 0 for SUCCEEDED, 1 for CANCELED and ABORTED."
+The command prints `result` and `status`, and with --feedback each `feedback` before them. The first SIGINT cancels the
+goal and waits for its end. The second one ends the command. Exit status: 0 for SUCCEEDED, 1 for CANCELED and ABORTED."
     )]
     SendGoal {
-        /// Its name, with or without the leading slash
+        /// Name, with or without the leading slash
         action: String,
         #[command(flatten)]
         goal: TypedValue,

@@ -24,7 +24,7 @@ use self::topic::TopicVerb;
 /// The subjects of the commands, each with its verbs.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum CommandSubject {
-    /// Watch topics of a running pendularm, and publish
+    /// Watch and publish topics of a running pendularm
     Topic(Subject<TopicVerb>),
     /// Call services of a running pendularm
     Service(Subject<ServiceVerb>),
@@ -39,8 +39,8 @@ pub enum CommandSubject {
 Example:
   pendularm diagnostics || echo 'a part is not OK'
 
-It waits for one message of /diagnostics. A running arm sends one every second. The exit status is 1 if a part is not
-OK.")]
+The command waits for one message of /diagnostics. A running arm sends one every second. The exit status is 1 if a part
+is not OK.")]
     Diagnostics(RuntimeOptions),
 }
 

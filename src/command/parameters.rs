@@ -26,7 +26,7 @@ Examples:
   pendularm param get /arm_sim gravity
   pendularm param get /arm_sim robot_description > arm.urdf
 
-A text is printed as it is, with --json as JSON.")]
+A text is printed without quotes. With --json it is a JSON string.")]
     Get(ParameterName),
     /// Set a parameter
     #[command(after_help = "\
@@ -35,11 +35,11 @@ Examples:
   pendularm param set /arm_sim masses '[1, 0.5]'
   pendularm param set /arm_sim integrator verlet
 
-It prints nothing after a success.")]
+The command prints nothing after a success.")]
     Set {
         #[command(flatten)]
         parameter: ParameterName,
-        /// The value, in JSON or YAML
+        /// Value, in JSON or YAML
         #[arg(allow_negative_numbers = true)]
         value: String,
     },
@@ -48,9 +48,9 @@ It prints nothing after a success.")]
 /// A parameter and its node.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct ParameterName {
-    /// Its node: `/arm_sim`
+    /// Node: `/arm_sim`
     node: String,
-    /// Its name; `pendularm param list` lists all
+    /// Name; `pendularm param list` lists all
     name: String,
 }
 

@@ -45,10 +45,10 @@ pub struct RuntimeOptions {
     #[arg(long, global = true, value_name = "ADDRESS")]
     #[arg(default_value = "127.0.0.1:9095", value_parser = ValueReader(read_address))]
     connect: String,
-    /// Longest wait for an answer or message, in seconds; without it only connecting has a limit, 5 s
+    /// Longest wait for an answer or message, in seconds; by default no limit, but 5 s for connecting
     #[arg(long, global = true, value_name = "SECONDS", value_parser = ValueReader(read_positive))]
     timeout: Option<f64>,
-    /// The runtime's token; safer in the variable, since users can see options
+    /// Token of the runtime; prefer the variable, because other users can see options
     #[arg(long, global = true, value_name = "TOKEN", env = "ARM_SIM_TOKEN")]
     #[arg(value_parser = ValueReader(Token::read))]
     token: Option<Token>,

@@ -31,7 +31,7 @@ Examples:
   pendularm topic echo /joint_states --field position -n 3
   pendularm topic echo --json /clock | head -n 3
 
-Each message is a YAML document that ends with ---, or with --json a line.")]
+Each message is a YAML document that ends with ---. With --json it is one line.")]
     Echo {
         #[command(flatten)]
         source: SubscribedTopic,
@@ -50,8 +50,8 @@ Each message is a YAML document that ends with ---, or with --json a line.")]
 Example:
   pendularm topic hz /joint_states
 
-Once a second it prints the rate [1/s], and least, largest and standard deviation of the time between two
-messages [s].")]
+The command prints every second: the rate [1/s], and the smallest, the largest and the standard deviation of the time
+between two messages [s].")]
     Hz {
         #[command(flatten)]
         source: SubscribedTopic,
@@ -66,9 +66,9 @@ Examples:
   pendularm topic pub -1 /joint_trajectory '{points: [{positions: [0.3, -0.5]}]}'
   pendularm topic pub -r 10 /chatter std_msgs/msg/String 'data: hello'
 
-Without --once or --times it publishes until a signal ends it.")]
+Without --once or --times the command publishes until a signal ends it.")]
     Pub {
-        /// Its name, with or without the leading slash
+        /// Name, with or without the leading slash
         topic: String,
         #[command(flatten)]
         message: TypedValue,
@@ -88,9 +88,9 @@ Without --once or --times it publishes until a signal ends it.")]
 /// The topic of a subscription.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct SubscribedTopic {
-    /// Its name, with or without the leading slash
+    /// Name, with or without the leading slash
     topic: String,
-    /// Its type, as pkg/Name; with it the command waits for a topic that does not exist yet
+    /// Type, as pkg/Name; with a type the command waits for a topic that does not exist yet
     #[arg(value_name = "TYPE")]
     type_name: Option<String>,
 }

@@ -236,7 +236,7 @@ pub struct Excess {
 
 /// A path, and the tolerances for following it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course<const N: usize> {
+pub struct PathTask<const N: usize> {
     /// The path.
     pub path: JointPath<N>,
     /// Tolerance on the way.
@@ -249,7 +249,7 @@ pub struct Course<const N: usize> {
     pub dwell: Dwell,
 }
 
-/// The progress of the joints on a course.
+/// The progress of the joints on a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Standing {
     /// They are on their way.
@@ -262,7 +262,7 @@ pub enum Standing {
     Late(Excess),
 }
 
-impl<const N: usize> Course<N> {
+impl<const N: usize> PathTask<N> {
     /// The progress of joints at `actual`, `time` after the start \[s\]. They have arrived once they have stayed
     /// within the tolerance for [`SUCCESS_HOLD`], because a joint may also pass through it.
     pub fn judge(&mut self, time: f64, actual: &State<N>) -> Standing {

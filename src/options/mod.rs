@@ -50,8 +50,7 @@ const AFTER_HELP: &str = "\
 The port speaks rosbridge JSON over TCP. With the web feature, which --version shows, it also speaks WebSocket and
 serves a page over HTTP.
 An option overrides its environment variable. An empty variable counts as unset.
-Exit status: 0 after a signal that asks it to end (SIGINT, SIGTERM, SIGHUP), 2 for a bad option or variable, 1 for any
-other failure.";
+Exit status: 0 after a signal (SIGINT, SIGTERM, SIGHUP), 2 for a bad option or variable, 1 for any other failure.";
 
 /// All options of the server.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -65,7 +64,7 @@ pub struct Options {
     #[arg(default_value = "127.0.0.1:9095")]
     #[arg(value_parser = ValueReader(read_bind))]
     pub bind: SocketAddr,
-    /// Clients served at once, at most 4096; a few of these places are kept for HTTP and WebSocket
+    /// Clients served at once, at most 4096; a few places are kept for HTTP, WebSocket and the commands below
     #[arg(long, env = "ARM_SIM_CLIENTS", value_name = "N")]
     #[arg(default_value_t = DEFAULT_CLIENTS)]
     #[arg(value_parser = ValueReader(|text| within(&(1..=MAX_CLIENTS), "a whole number", text)))]
@@ -90,11 +89,11 @@ pub struct Options {
     /// Secret token of at least 16 characters; prefer the variable, because other users can see options
     #[arg(long, env = "ARM_SIM_TOKEN", value_name = "TOKEN", value_parser = ValueReader(Token::read))]
     pub token: Option<Token>,
-    /// Record the run as MCAP into this file, which must not exist
+    /// New file for a record of the run, as MCAP
     #[cfg(feature = "record")]
     #[arg(long, env = "ARM_SIM_RECORD", value_name = "FILE")]
     pub record: Option<PathBuf>,
-    /// Existing folder for records that clients start by /recorder/start
+    /// Existing folder for the records of /recorder/start
     #[cfg(feature = "record")]
     #[arg(long, env = "ARM_SIM_RECORD_DIR", value_name = "FOLDER")]
     pub record_dir: Option<PathBuf>,
@@ -137,11 +136,11 @@ pub enum Parsed {
     /// Measure error against run time and stability, and write a report
     #[cfg(feature = "report")]
     Report(ReportOptions),
-    /// Repeat the steps of a recorded run and compare them with the record
+    /// Repeat the steps of a recorded run, and compare every state
     #[cfg(feature = "record")]
-    #[command(after_help = "Exit status: 0 if every state is the same bit for bit, 1 if not.")]
+    #[command(after_help = "Exit status: 0 if every state is bit-identical, 1 if not.")]
     Replay {
-        /// A record of --record or /recorder/start
+        /// The record, from --record or /recorder/start
         file: PathBuf,
     },
     /// A command for a running pendularm.

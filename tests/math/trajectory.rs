@@ -3,7 +3,7 @@
 
 use pendularm::math::arm::State;
 use pendularm::math::goal::{Dwell, SUCCESS_HOLD};
-use pendularm::math::trajectory::{Course, JointPath, PathError, Standing, Tolerance, Waypoint};
+use pendularm::math::trajectory::{JointPath, PathError, PathTask, Standing, Tolerance, Waypoint};
 
 const START: Waypoint<2> = Waypoint {
     time: 0.0,
@@ -116,7 +116,7 @@ fn distances_that_overflow_are_no_path() {
 
 #[test]
 fn a_path_is_judged_by_its_path_tolerances_and_at_the_end_by_its_goal_tolerances() {
-    let mut course = Course {
+    let mut task = PathTask {
         path: JointPath::new(START, vec![straight(1.0, [0.5, 0.5])]).unwrap(),
         on_the_way: Tolerance {
             position: [Some(0.1), None],
@@ -130,7 +130,7 @@ fn a_path_is_judged_by_its_path_tolerances_and_at_the_end_by_its_goal_tolerances
         dwell: Dwell::default(),
     };
     let mut standing =
-        |time, position, velocity| match course.judge(time, &State { position, velocity }) {
+        |time, position, velocity| match task.judge(time, &State { position, velocity }) {
             Standing::Moving => "moving".to_owned(),
             Standing::Arrived => "arrived".to_owned(),
             Standing::OffPath(excess) => format!("off: {excess}"),
@@ -156,11 +156,11 @@ fn a_path_is_judged_by_its_path_tolerances_and_at_the_end_by_its_goal_tolerances
         assert!(found.starts_with(expected), "{found} for {expected}");
     }
     let far = State::at_rest([9.0; 2]);
-    course.patience = f64::INFINITY;
-    assert_eq!(course.judge(1e300, &far), Standing::Moving);
-    course.at_the_end = Tolerance {
+    task.patience = f64::INFINITY;
+    assert_eq!(task.judge(1e300, &far), Standing::Moving);
+    task.at_the_end = Tolerance {
         position: [None; 2],
         velocity: [None; 2],
     };
-    assert_eq!(course.judge(1.0, &far), Standing::Arrived);
+    assert_eq!(task.judge(1.0, &far), Standing::Arrived);
 }

@@ -47,12 +47,12 @@ fn the_timestep_and_the_evaluations_are_runs() {
     };
     let rk4 = evaluations(Method::Rk4);
     let steps = rk4 / f64::from(Method::Rk4.evaluations());
-    agrees(README, "RK4 takes steps of ", duration / steps, 3);
-    agrees(README, "**, and ", rk4 / duration, 3);
+    agrees(README, "true motion with steps of ", duration / steps, 3);
+    agrees(README, "RK4 takes ", rk4 / duration, 3);
     let verlet = evaluations(Method::Verlet) / rk4;
     agrees(README, "Verlet needs ", verlet, 3);
     // Euler is not within the error in as many steps as a search tries, and takes an evaluation in each.
-    let over = printed(README, "as many and Euler over ");
+    let over = printed(README, "as many, and Euler over ");
     let tried = 1 << 17;
     assert!(swing.task.run(Method::Euler, tried, 1e-4).error > 1e-4);
     assert!((over * rk4 / tried as f64 - 1.0).abs() < 5e-3, "{over}");
@@ -63,7 +63,7 @@ fn the_timestep_and_the_evaluations_are_runs() {
 fn the_parts_of_the_error_are_runs() {
     let parts = Budget::new(true, 2.0).parts(&[Method::Rk4], 2048)[0];
     agrees(STUDY, "at a control period of ", parts.timestep, 3);
-    agrees(STUDY, "Holding the effort costs ", parts.hold, 2);
+    agrees(STUDY, "The hold causes an error of ", parts.hold, 2);
     agrees(STUDY, "RK4's truncation ", parts.truncation, 2);
     agrees(STUDY, "and rounding ", parts.rounding, 2);
 }
@@ -77,10 +77,10 @@ fn the_printed_limits_are_those_of_the_loop() {
     };
     let (rk4, verlet) = (of(Method::Rk4), of(Method::Verlet));
     for (before, limit) in [
-        ("the 2-link arm goes unstable at ", rk4.held),
-        ("with RK4 and at ", verlet.held),
+        ("stable up to a timestep of ", rk4.held),
+        ("with RK4 and ", verlet.held),
         ("RK4 would be stable up to ", rk4.continuous),
-        ("limit of all poses is ", rk4.minimum_held),
+        ("limit of all poses with held effort is ", rk4.minimum_held),
     ] {
         agrees(STUDY, before, limit.unwrap(), 3);
     }

@@ -94,16 +94,16 @@ fn findings(section: &mut Section, held: &[Vec<Parts>]) {
     };
     let period = seconds(rk4.timestep);
     section.findings.push(format!(
-        "**Holding the effort costs {} rad, RK4's truncation {} and rounding {}**. These are errors at a control \
-         period of {period}, on {REACH}. The hold is measured against a law that acts at every instant. A better \
-         method cannot recover the loss of the control period.",
+        "**The hold causes an error of {} rad, RK4's truncation {} rad and rounding {} rad**. The motion is {REACH}, \
+         at a control period of {period}. The error of the hold is the distance from a law that acts at every instant. \
+         A better method does not reduce it.",
         scientific(rk4.hold),
         scientific(rk4.truncation),
         scientific(rk4.rounding)
     ));
     section.findings.push(format!(
-        "**Against the loop whose law runs at the same instants RK4 is {} rad off, Verlet {} and Euler {}**, on the \
-         same reach at {period}. The method matters for the simulation, the period for the control.",
+        "**Against the loop with the same control period, the error is {} rad with RK4, {} rad with Verlet and {} rad \
+         with Euler**. This is the same motion at {period}.",
         scientific(rk4.truncation),
         scientific(verlet.truncation),
         scientific(euler.truncation),

@@ -62,10 +62,10 @@ pub(super) fn make(section: &mut Section) {
         one_digit(chaotic.end(Method::Rk4))
     );
     section.findings.push(format!(
-        "**Over {} s of chaotic 2-link swing from horizontal at {} the energy error is {} of the scale with Verlet, {} \
-         with midpoint and {} with RK4**. The scale is the energy between the hanging and the upright arm. These are \
-         {ENSEMBLE} swings released a billionth of a radian apart. This Verlet is not symplectic: the forces of an arm \
-         depend on velocity.",
+        "**The energy error of a chaotic 2-link swing of {} s at {} is {} with Verlet, {} with midpoint and {} with \
+         RK4**. It is relative to the energy between the hanging and the upright arm. The figures are from {ENSEMBLE} \
+         swings that start horizontally, a billionth of a radian apart. This Verlet is not symplectic, because the \
+         forces of an arm depend on velocity.",
         number(duration),
         seconds(TIMESTEP),
         ends_of_ensemble(Method::Verlet, duration),

@@ -44,16 +44,12 @@ const fn untimed(name: &'static str, title: &'static str, make: fn(&mut Section)
 /// All sections in the order in which they are shown.
 pub(crate) const SECTIONS: &[Maker] = &[
     timed("error", "Error against cost", error::make),
-    untimed("stability", "Where it goes unstable", stability::make),
-    untimed(
-        "nonlinear",
-        "Where large motions go unstable",
-        nonlinear::make,
-    ),
-    timed("stiff", "Where explicit methods end", stiff::make),
+    untimed("stability", "Limits of stability", stability::make),
+    untimed("nonlinear", "Stability of large motions", nonlinear::make),
+    timed("stiff", "Stiffness and explicit methods", stiff::make),
     untimed("scenarios", "Stiff and extreme scenes", scenarios::make),
-    untimed("budget", "Where an error comes from", budget::make),
+    untimed("budget", "Parts of the error", budget::make),
     untimed("drift", "Energy over long swings", drift::make),
     untimed("conditioning", "Uneven arms", conditioning::make),
-    untimed("work", "What a scene does not need is left out", work::make),
+    untimed("work", "Work that is left out", work::make),
 ];

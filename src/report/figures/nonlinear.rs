@@ -145,8 +145,7 @@ fn floquet(section: &mut Section) {
     let first = multipliers.iter().position(is_unstable);
     let ends =
         first.and_then(|first| Some((SWINGS.get(first.checked_sub(1)?)?, SWINGS.get(first)?)));
-    let swing =
-        "**The periodic swing of 2 links that begins at small amplitude is stable by itself";
+    let swing = "**The slow periodic swing of the free 2-link arm is stable";
     section.findings.push(match (ends, SWINGS.last().zip(multipliers.last().copied().flatten())) {
         (Some((&(mut stable), &(mut unstable))), Some((last, multiplier))) => {
             for _ in 0..4 {
@@ -155,8 +154,8 @@ fn floquet(section: &mut Section) {
                 *(if is_unstable { &mut unstable } else { &mut stable }) = middle;
             }
             format!(
-                "{swing} up to {} rad of the first joint**. Beyond, a deviation grows in every period ({}-fold at {} \
-                 rad), and no method is accurate for long.",
+                "{swing} up to {} rad at the first joint**. In it both links turn to the same side. Beyond, a \
+                 deviation grows in every period ({}-fold at {} rad), so no method is accurate for long.",
                 number((100.0 * stable).floor() / 100.0),
                 number(multiplier),
                 number(*last),

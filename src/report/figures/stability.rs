@@ -30,10 +30,10 @@ fn finding(section: &mut Section) {
     let (rk4, verlet) = (of(Method::Rk4), of(Method::Verlet));
     let said = |limit: Option<f64>| seconds(limit.unwrap_or(f64::NAN));
     section.findings.push(format!(
-        "**Held at (0.4, 0.8) with the default gains, the 2-link arm goes unstable at {} with RK4 and at {} with \
-         Verlet**. Both limits are the same, since the effort is held for the step. With the law in every stage RK4 \
-         would be stable up to {}. That limit belongs to the simulation. The first one belongs to the controller, and \
-         a real arm would show it. The smallest limit of all poses is {}.",
+        "**At (0.4, 0.8) with the default gains, the 2-link arm is stable up to a timestep of {} with RK4 and {} with \
+         Verlet**. The limits are equal because the effort is held for the step. They belong to the controller, so a \
+         real arm has them too. With the law in every stage RK4 would be stable up to {}. That limit belongs to the \
+         simulation. The smallest limit of all poses with held effort is {}.",
         said(rk4.held),
         said(verlet.held),
         said(rk4.continuous),

@@ -174,8 +174,8 @@ impl Measured {
             self.encoded("server-11-subscribers"),
         ) {
             section.findings.push(format!(
-                "**While nobody listens the server encodes {} messages a second**. For one subscriber it encodes {} at \
-                 {} instructions each, for eleven {} at {}.",
+                "**Without a subscriber the server encodes {} messages a second**. With one it encodes {}, with {} \
+                 instructions for each. With eleven it encodes {}, with {} for each.",
                 number(none.0),
                 number(one.0),
                 number(one.1),
@@ -186,10 +186,10 @@ impl Measured {
         let [off, on] = ["step-2-rk4-free", "step-2-rk4-pid"].map(|name| self.count(name));
         if let (Some(off), Some(on)) = (off, on) {
             section.findings.push(format!(
-                "**The arm is the cost of a step**: without the control law a 2-link RK4 step is {} instructions \
-                 instead of {}.",
-                number(off.round()),
-                number(on.round())
+                "**The control law is a small part of a step**. A 2-link RK4 step takes {} instructions with it, and {} \
+                 without it.",
+                number(on.round()),
+                number(off.round())
             ));
         }
     }

@@ -22,7 +22,7 @@ use crate::actors::node::{
 use crate::math::arm::State;
 use crate::math::goal::{Cadence, Dwell};
 use crate::math::pid::Setpoint;
-use crate::math::trajectory::{Course, JointPath, Standing, Waypoint};
+use crate::math::trajectory::{JointPath, PathTask, Standing, Waypoint};
 use crate::protocol::catalog::Action;
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::op::{Arguments, GoalStatus};
@@ -49,7 +49,7 @@ pub struct PathFollower<const N: usize> {
 
 /// The active goal.
 struct ActivePath<const N: usize> {
-    course: Course<N>,
+    task: PathTask<N>,
     client: ActionClient,
     /// Simulation time of its start \[s\], since the last reset.
     began: f64,
@@ -179,7 +179,7 @@ impl<const N: usize> PathFollower<N> {
             before.end(GoalStatus::Aborted, ResultCode::InvalidGoal, why);
         }
         self.active = Some(ActivePath {
-            course: Course {
+            task: PathTask {
                 path,
                 on_the_way: goal.on_the_way,
                 at_the_end: goal.at_the_end,
@@ -222,17 +222,15 @@ impl<const N: usize> PathFollower<N> {
             return self.abort(&obstacle.to_string());
         }
         let time = pose.time - goal.began;
-        let desired = goal.course.path.at(time);
-        let standing = goal.course.judge(time, &pose.state);
+        let desired = goal.task.path.at(time);
+        let standing = goal.task.judge(time, &pose.state);
         let may_be_due = goal.client.wants_feedback && !pose.stands_still;
         if may_be_due && goal.feedback.due(pose.time) {
             let values = feedback(pose.time, time, &desired, &pose.state);
             goal.client.feed_back(values);
         }
         let next = match standing {
-            Standing::Moving | Standing::Arrived => {
-                goal.course.path.held(time, PERIOD.as_secs_f64())
-            }
+            Standing::Moving | Standing::Arrived => goal.task.path.held(time, PERIOD.as_secs_f64()),
             Standing::OffPath(_) | Standing::Late(_) => at_rest(&pose.state),
         };
         let moved = MoveSetpoint {
