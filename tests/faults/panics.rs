@@ -2,8 +2,7 @@
 //!
 //! A panic in a computation is in `src/actors/compute/workers/tests.rs`.
 //!
-//! **Invariant:** the panic hook belongs to the process, so these tests share one that records panics and ends
-//! nothing.
+//! **Invariant:** the panic hook belongs to the process, so these tests share one that records panics and ends nothing.
 
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;

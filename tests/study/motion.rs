@@ -1,5 +1,4 @@
-//! The predicted timestep limit of a motion, against runs: hardly any arm diverges below it, and most do far beyond
-//! it.
+//! The predicted timestep limit of a motion, against runs: hardly any arm diverges below it, and most do far beyond it.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 

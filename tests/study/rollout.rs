@@ -128,8 +128,7 @@ fn in_pieces(request: RolloutRequest<2>) -> (Rollout<2>, u64) {
     }
 }
 
-/// Motions so fast that a reference needs thousands of evaluations for one step: a piece ends within the
-/// step.
+/// Motions so fast that a reference needs thousands of evaluations for one step: a piece ends within the step.
 #[test]
 fn a_run_in_short_pieces_gives_the_same_bits_as_one_made_at_once_however_wild_the_motion() {
     // A piece has 2000 evaluations, and those of the last step: 22 coefficients of a reference at most.

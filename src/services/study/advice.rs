@@ -9,7 +9,6 @@ use super::{Computed, Present, Refused, StudyWork, arm_of, with_period};
 use crate::math::arm::{ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
-use crate::math::simulation::ControlPeriod;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
@@ -234,7 +233,7 @@ fn demands<const N: usize>(
         arm,
         method: ask.method.unwrap_or(present.method),
         timestep: ask.timestep.unwrap_or(present.timestep),
-        period: ControlPeriod::default(),
+        period: with_period(present.period, Some(0.0)),
         ..*present
     };
     let requirements = GainsRequirements {
@@ -283,7 +282,7 @@ fn task<const N: usize>(ask: &PlanRun<N>, present: &Present<N>) -> Result<Task<N
         arm,
         gains: gains.map_or(missing, |gains| gains.applied_to(&missing)),
         setpoint: ask.setpoint.map_or(control.setpoint, Setpoint::at),
-        period: with_period(ControlPeriod::default(), ask.control_period),
+        period: with_period(control.period, Some(ask.control_period.unwrap_or(0.0))),
         ..*control
     };
     let usual = if control.is_free() {

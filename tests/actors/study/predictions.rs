@@ -74,8 +74,7 @@ fn predictions_are_the_studys_and_missing_fields_are_the_arms_own() {
     });
 }
 
-/// The search for gains and for a plan are the library's; fields that are left out are the arm's
-/// own.
+/// The search for gains and for a plan are the library's; fields that are left out are the arm's own.
 #[test]
 fn advice_is_the_studys_and_missing_fields_are_the_arms_own() {
     in_real_time(async {

@@ -1,7 +1,6 @@
 //! Series of messages in an outbox: how they are taken, dropped, counted and throttled.
 //!
-//! **Invariant:** a series is one frame to a reader of several messages, and separate messages to a reader of
-//! one.
+//! **Invariant:** a series is one frame to a reader of several messages, and separate messages to a reader of one.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -80,8 +80,7 @@ fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally)
         least == 0.0 || found.advised.is_none_or(|advised| advised <= least),
         "{told}: {found:?}"
     );
-    // A loop that clearly runs away is reported as such, and one that is stable at some timestep is
-    // not.
+    // A loop that clearly runs away is reported as such, and one that is stable at some timestep is not.
     let is_said = found.rest == Rest::Unstable;
     assert!(
         if is_said {

@@ -53,8 +53,7 @@ impl Dice {
         Arm::new(lengths, masses, gravity).unwrap()
     }
 
-    /// From springs that cannot hold the arm to stiff ones, from weak damping to strong; some gains
-    /// are zero.
+    /// From springs that cannot hold the arm to stiff ones, from weak damping to strong; some gains are zero.
     fn gains<const N: usize>(&mut self, arm: &Arm<N>) -> Gains<N> {
         let (lengths, masses) = (arm.lengths(), arm.masses());
         let pace = 10.0 * self.size(1.0);
