@@ -82,7 +82,7 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   const usual = free ? SHARE * inForce : Math.min(afterReset(answer), SHARE * motion);
   return {
     limit: inForce,
-    where: moving ? `moving at ${significant(speed ?? NaN, 3)} rad/s` : place,
+    where: moving ? `moving at up to ${significant(speed ?? NaN, 3)} rad/s` : place,
     place,
     everyPose: Math.min(motion, everyPoseAtRest),
     everyPoseAtRest,

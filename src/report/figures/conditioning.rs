@@ -78,12 +78,12 @@ pub(super) fn make(section: &mut Section) {
     section.figure(
         "conditioning",
         &format!(
-            "Bent and stretched, the recursion loses at most {} digits where eliminating the mass matrix loses most \
-             of them",
+            "Bent and stretched, the recursion loses at most {} of 16 digits, and elimination of the mass matrix far \
+             more",
             number(straight)
         ),
-        "Worst of all sampled states. The dashed line is the change by the last bit of an angle: no algorithm can be \
-         better. Crosses at the top: elimination failed.",
+        "Worst of all sampled states. The dashed line is the change of the accelerations by the last bit of an angle. An \
+         algorithm below it loses less than the angles do. Crosses at the top: elimination failed.",
         &panels,
     );
 }

@@ -73,8 +73,8 @@ pub(super) fn make(section: &mut Section) {
     section.figure(
         "nonlinear-map",
         "Beyond small deviations the timestep is limited by speed",
-        "Top: moves of 2 links under the default gains, from rest. Blue: both joints are within 0.02 rad after 6 s; \
-         orange: they are not. Bottom: free swings from (0, 0.5) with the first joint spinning. Orange: the energy \
+        "Moves: 2 links under the default gains, from rest. Blue: both joints are within 0.02 rad after 6 s; \
+         orange: they are not. Swings: free, from (0, 0.5) with the first joint spinning. Orange: the energy \
          above the hanging arm's doubles or halves within 4 s. Line: the smaller of two limits. One is that by \
          linearisation (moves: the least of all poses; swings: of small swings, where there is one). The other is \
          timestep_limit_motion of /study/stability. Moves that no timestep brings home in time are orange at the top \

@@ -99,14 +99,16 @@ fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Plot {
         let points = points.filter_map(|(time, angles)| Some((*time, *angles.get(joint)?)));
         plot.add(Curve::line(Key::line(class, label), points));
     }
-    if watched.as_ref().is_ok_and(|watched| watched.diverged) {
+    let diverged = watched.as_ref().is_ok_and(|watched| watched.diverged);
+    let lasted = if diverged { end } else { live.seconds() };
+    if diverged {
         let lost = [(end, f64::INFINITY)];
         plot.add(Curve::dots(Key::line("ink", ""), lost));
     }
     let (link, note) = match watched {
         Ok(watched) => (
             format!("{PAGE}{}", watched.fragment),
-            format!("{}, ±{} rad", seconds(live.seconds()), number(largest)),
+            format!("{}, ±{} rad", seconds(lasted), number(largest)),
         ),
         Err(why) => (String::new(), why),
     };

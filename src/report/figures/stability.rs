@@ -209,8 +209,8 @@ fn control_period(section: &mut Section) {
         ),
         "2 links, default gains, effort held over the period. Curves: spectral radius of one control period of the \
          linearised loop. Dots: the growth of a small deviation of the arm itself per period, over 4000 periods. The \
-         largest stable control period is where a curve crosses 1: shorter steps do not increase it. Only Euler with \
-         one step per period has a curve of its own.",
+         largest stable control period is where a curve crosses 1: shorter steps do not increase it. With \
+         Euler the growth depends on the steps per period.",
         &panels,
     );
 }
