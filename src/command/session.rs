@@ -48,7 +48,7 @@ pub struct RuntimeOptions {
     /// Longest wait for an answer or message, in seconds; by default no limit, but 5 s for connecting
     #[arg(long, global = true, value_name = "SECONDS", value_parser = ValueReader(read_positive))]
     timeout: Option<f64>,
-    /// Token of the runtime; prefer the variable, because other users can see options
+    /// Token of the runtime; prefer the variable: other users can see options
     #[arg(long, global = true, value_name = "TOKEN", env = "ARM_SIM_TOKEN")]
     #[arg(value_parser = ValueReader(Token::read))]
     token: Option<Token>,
