@@ -37,8 +37,7 @@ async fn computing(answers: usize, workers: &WorkerPool) -> Gateway {
 async fn ask_steps(client: &mut Peer, steps: usize) {
     client
         .send(json!({"op": "call_service", "service": STEP, "id": steps,
-            "args": {"function": "sin(t)", "x0": 1.0 / 3.0, "dt": 1e-3, "steps": steps,
-                "integrator": "euler"}}))
+            "args": {"function": "sin(t)", "x0": 1.0 / 3.0, "dt": 1e-3, "steps": steps, "integrator": "euler"}}))
         .await;
 }
 

@@ -79,8 +79,7 @@ fn no_text_of_a_client_writes_a_line_of_the_log() {
                 client.send(&json!({"op": op, member: text}));
             }
             // Its refusal is logged with the name.
-            let answer = json!({"op": "service_response", "service": text, "id": text, "values": {},
-                "result": true});
+            let answer = json!({"op": "service_response", "service": text, "id": text, "values": {}, "result": true});
             client.send(&answer);
             client.send_bytes(format!("{text}\n").as_bytes());
             client.settle();

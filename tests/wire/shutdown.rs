@@ -49,8 +49,7 @@ fn goals_calls_and_computations_end_with_the_reason_at_shutdown() {
     ];
     for (action, args) in &goals {
         client.send(
-            &json!({"op": "send_action_goal", "action": action, "id": action, "args": args,
-            "feedback": true}),
+            &json!({"op": "send_action_goal", "action": action, "id": action, "args": args, "feedback": true}),
         );
         client.receive_where("feedback", |frame| {
             frame["op"] == "action_feedback" && frame["action"] == *action
@@ -64,8 +63,7 @@ fn goals_calls_and_computations_end_with_the_reason_at_shutdown() {
     let endless = json!({"function": "sin(sin(sin(sin(sin(sin(t))))))^2+cos(cos(cos(cos(t))))^3", "x0": 0.1,
         "dt": 1e-3, "steps": 1_000_000, "integrator": "rk4"});
     client.send(
-        &json!({"op": "call_service", "id": "steps", "service": "/arm_sim/integration_step",
-        "args": endless}),
+        &json!({"op": "call_service", "id": "steps", "service": "/arm_sim/integration_step", "args": endless}),
     );
     assert_ends(&mut runtime);
     let mut ends = rest(&mut client);

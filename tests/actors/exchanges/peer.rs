@@ -49,7 +49,7 @@ impl Peer {
         loop {
             return match self.stream.next_event().await {
                 // Some readers end a line at a carriage return.
-                Ok(Event::Text(text)) if text.contains('\r') => Err(format!("two lines: {text}")),
+                Ok(Event::Text(text)) if text.contains(['\r', '\n']) => Err(text),
                 Ok(Event::Text(text)) => match serde_json::from_str(&text) {
                     Ok(value) => Ok(Frame(text, value)),
                     Err(error) => Err(format!("{error}: {text}")),

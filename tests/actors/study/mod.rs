@@ -51,13 +51,13 @@ fn settings<const N: usize>() -> Present<N> {
                 ki: [50.0; N],
                 kd: [20.0; N],
             },
-            setpoint: Setpoint {
-                position: [0.4; N],
-                velocity: [0.0; N],
-            },
+            setpoint: Setpoint::at([0.4; N]),
             method: Method::Midpoint,
             timestep: 0.002,
-            period: ControlPeriod::default(),
+            period: ControlPeriod {
+                period: 0.0,
+                delay: true,
+            },
         },
         state: State {
             position: [0.3; N],
@@ -71,8 +71,7 @@ fn settings_as_args<const N: usize>() -> Value {
     json!({
         "integrator": "midpoint",
         "gains": {"kp": vec![300.0; N], "ki": vec![50.0; N], "kd": vec![20.0; N]},
-        "params": {"gravity": 3.7, "masses": vec![1.5; N], "lengths": vec![0.8; N]},
-        "setpoint": vec![0.4; N],
+        "params": {"gravity": 3.7, "masses": vec![1.5; N], "lengths": vec![0.8; N]}, "setpoint": vec![0.4; N],
     })
 }
 

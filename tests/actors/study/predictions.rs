@@ -25,8 +25,7 @@ fn stability_values<const N: usize>(
         "certified": limits.certified,
         "worst_pose": limits.worst_pose.map(|pose| pose.to_vec()),
         "critical": {
-            "growth_per_step": critical.growth_per_step,
-            "frequency": critical.frequency,
+            "growth_per_step": critical.growth_per_step, "frequency": critical.frequency,
             "joint": critical.joint,
         },
         "timestep_limit_motion": bears,
@@ -47,13 +46,14 @@ async fn assert_predictions_are_the_studys<const N: usize>() {
     let mut client = caller_of(&bench).await;
     let control = settings::<N>().control;
     let all = settings_as_args::<N>();
-    let nulls = json!({"integrator": null, "gains": {"kp": null, "colour": "red"}, "params": null,
-        "setpoint": null});
-    let some =
-        json!({"integrator": "rk4", "gains": {"kd": vec![9.0; N]}, "params": {"gravity": 0}});
+    let nulls = json!({"integrator": null, "gains": {"kp": null, "colour": "red"}, "params": null, "setpoint": null});
+    let some = json!({"integrator": "rk4", "gains": {"kd": vec![9.0; N]}, "params": {"gravity": 0},
+        "setpoint": vec![0.7; N], "control_period": 0.003});
     let mut changed = control.with_method(Method::Rk4);
     changed.arm = Arm::new([0.8; N], [1.5; N], 0.0).unwrap();
     changed.gains.kd = [9.0; N];
+    changed.setpoint = Setpoint::at([0.7; N]);
+    changed.period.period = 0.003;
     let (own, changed) = (predicted(&control), predicted(&changed));
     for (args, expected) in [
         (json!({}), &own),
@@ -74,42 +74,59 @@ fn predictions_are_the_studys_and_missing_fields_are_the_arms_own() {
     });
 }
 
-/// The search for gains and for a plan are the library's; fields that are left out are the arm's own.
+/// The searches for gains and plans are the library's. Each field has its effect; missing fields are the arm's own.
 #[test]
 fn advice_is_the_studys_and_missing_fields_are_the_arms_own() {
     in_real_time(async {
         let bench = study::<2>();
         let mut client = caller_of(&bench).await;
         let Present { control, state } = settings::<2>();
-        let requirements = GainsRequirements {
-            settling_time: 4.0,
-            margin: 1.25,
-        };
-        let found = at_once(search_gains(control, requirements)).unwrap();
-        let values = client.ask(Service::SuggestGains.name(), json!({})).await;
-        assert_eq!(values["kp"], json!(found.gains.kp));
-        let limit = found.limit.unwrap();
-        assert_eq!(values["timestep_limit"], limit);
-        assert_eq!(values["margin"], limit / control.timestep);
-        let task = Task {
-            control,
-            start: state,
-            duration: 4.0,
-            error: 0.05,
-        };
-        let best = at_once(plan(task)).unwrap().best;
-        let args = json!({"error": 0.05, "controller": true});
-        let values = client.ask(Service::Plan.name(), args).await;
-        assert_eq!(values["integrator"], best.method.name());
-        assert_eq!(values["timestep"], best.timestep);
-        assert_eq!(values["control_period"], best.timestep);
-        // The hold of the efforts is not part of the error, and the timesteps are whole parts of the period.
-        let args = json!({"error": 1e-4, "controller": true, "control_period": 0.004});
-        let values = client.ask(Service::Plan.name(), args).await;
-        assert_eq!(values["control_period"], 0.004);
-        for timestep in values["timesteps"].as_array().unwrap() {
-            let steps = 0.004 / timestep.as_f64().unwrap();
-            assert!((steps - steps.round()).abs() < 1e-9, "{values}");
+        let mut changed = control.with_method(Method::Euler).with_timestep(0.001);
+        changed.arm = control.arm.weightless();
+        changed.gains.kp = [200.0; 2];
+        changed.setpoint = Setpoint::at([0.7; 2]);
+        changed.period.period = 0.004;
+        let (position, velocity) = ([0.1; 2], [0.5; 2]);
+        let moving = State { position, velocity };
+        let all = json!({"settling_time": 2.5, "timestep": 0.001, "integrator": "euler", "error": 1e-4, "duration": 2,
+            "controller": true, "control_period": 0.004, "q0": position, "qdot0": velocity, "setpoint": [0.7, 0.7],
+            "gains": {"kp": [200, 200]}, "params": {"gravity": 0}});
+        let some = json!({"error": 0.05, "controller": true});
+        for (args, control, start, [settling_time, duration, error]) in [
+            (some, control, state, [4.0, 4.0, 0.05]),
+            (all, changed, moving, [2.5, 2.0, 1e-4]),
+        ] {
+            let mut every_step = control;
+            every_step.period.period = 0.0;
+            let required = GainsRequirements {
+                settling_time,
+                margin: 1.25,
+            };
+            let found = at_once(search_gains(every_step, required)).unwrap();
+            let values = client.ask(Service::SuggestGains.name(), args.clone()).await;
+            assert_eq!(values["kp"], json!(found.gains.kp));
+            let limit = found.limit.unwrap();
+            assert_eq!(values["timestep_limit"], limit);
+            assert_eq!(values["margin"], limit / control.timestep);
+            let best = at_once(plan(Task {
+                control,
+                start,
+                duration,
+                error,
+            }))
+            .unwrap()
+            .best;
+            let values = client.ask(Service::Plan.name(), args).await;
+            let period = control.period.period;
+            assert_eq!(values["integrator"], best.method.name());
+            assert_eq!(values["timestep"], best.timestep);
+            assert_eq!(values["error"], best.error);
+            // The timesteps are whole parts of a given period.
+            assert_eq!(values["control_period"], period.max(best.timestep));
+            for timestep in values["timesteps"].as_array().unwrap() {
+                let steps = period / timestep.as_f64().unwrap();
+                assert!((steps - steps.round()).abs() < 1e-9, "{values}");
+            }
         }
     });
 }

@@ -32,14 +32,12 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
                 }
                 live.set_method(method);
                 live.set_timestep(0.005);
+                live.set_control_period(settings::<2>().control.period);
                 live.set_state(State {
                     position: [0.4, -0.3],
                     velocity: [0.5, 1.0],
                 });
-                live.set_setpoint(Setpoint {
-                    position: [1.0, -0.5],
-                    velocity: [0.0; 2],
-                });
+                live.set_setpoint(Setpoint::at([1.0, -0.5]));
                 let values = client.ask(Service::Rollout.name(), args.clone()).await;
                 let times: Vec<f64> = serde_json::from_value(values["times"].clone()).unwrap();
                 assert_eq!(times.len(), 51);

@@ -70,8 +70,7 @@ fn types_that_the_runtime_does_not_know_have_any_field() {
     let asked = client.receive_where("call", |frame| frame["op"] == "call_service");
     assert_eq!(asked["args"], json!({"any": {"thing": 1}, "b:c": 2}));
     client.send(
-        &json!({"op": "service_response", "service": "/own", "id": asked["id"], "values": {},
-            "result": true}),
+        &json!({"op": "service_response", "service": "/own", "id": asked["id"], "values": {}, "result": true}),
     );
     assert_eq!(call.join().unwrap().status.code(), Some(0));
     said(&runtime, "topic pub -1 /own own_msgs/msg/Own '{any: 1}'");

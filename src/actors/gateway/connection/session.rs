@@ -8,8 +8,6 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::{Bytes, BytesMut};
-#[cfg(feature = "web")]
-use hyper::StatusCode;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::sync::Notify;
 use tokio::time::{Instant, sleep, sleep_until, timeout};
@@ -31,8 +29,6 @@ use crate::protocol::messages::{self, Level};
 use crate::protocol::wire::frame::Foreign;
 use crate::protocol::wire::frame::{Opening, opening};
 use crate::protocol::wire::json::Payload;
-#[cfg(feature = "web")]
-use crate::web::response::refusal;
 
 /// A client whose protocol is being detected.
 pub(super) struct ClientSession {
@@ -102,7 +98,7 @@ impl ClientSession {
                     biased;
                     how = self.qualify(&mut stream, &mut first, Instant::now() + time) => how,
                     _ = &mut slot => {
-                        self.refuse_evicted(&mut stream, &first, why).await;
+                        self.refuse_evicted(&mut stream, why).await;
                         return None;
                     }
                 };
@@ -262,19 +258,10 @@ impl ClientSession {
         }
     }
 
-    /// Closes an evicted client. Sends the reason if the socket accepts it without delay.
-    async fn refuse_evicted<S>(&self, stream: &mut S, first: &[u8], why: Refused)
-    where
-        S: AsyncWrite + Unpin,
-    {
-        let why = self.turn_away(why);
-        let message = match opening(first) {
-            #[cfg(feature = "web")]
-            Opening::Foreign(Foreign::Http) => {
-                refusal(StatusCode::SERVICE_UNAVAILABLE, &why).into()
-            }
-            _ => refused(&why, None),
-        };
+    /// Closes an evicted client that has sent no whole first frame and no request. Sends the reason if the socket accepts
+    /// it without delay.
+    async fn refuse_evicted<S: AsyncWrite + Unpin>(&self, stream: &mut S, why: Refused) {
+        let message = refused(&self.turn_away(why), None);
         let tell = async {
             stream.write_all(&message).await?;
             stream.shutdown().await

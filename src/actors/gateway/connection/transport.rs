@@ -343,20 +343,18 @@ impl WebSocket {
             while !rest.is_empty() {
                 let room = FRAGMENT.saturating_sub(written);
                 let kind = self.unfinished.unwrap_or_else(|| kind_of(rest));
-                let (piece, is_last) = first_piece(rest, kind == opcode::TEXT, room);
+                let (piece, taken, is_last) = first_piece(rest, kind == opcode::TEXT, room);
                 if written > 0 && !is_last {
                     return written;
                 }
-                written += piece.len();
-                rest.advance(piece.len());
+                written += taken;
+                rest.advance(taken);
                 let opcode = match self.unfinished {
                     Some(_) => opcode::CONTINUATION,
                     None => kind,
                 };
                 self.unfinished = (!is_last).then_some(kind);
-                let is_line = is_last && kind == opcode::TEXT;
-                let line = piece.strip_suffix(b"\n").filter(|_| is_line);
-                append_frame(&mut self.output, opcode, is_last, line.unwrap_or(piece));
+                append_frame(&mut self.output, opcode, is_last, piece);
                 if !is_last {
                     return written;
                 }
@@ -411,14 +409,17 @@ fn kind_of(frame: &[u8]) -> u8 {
     }
 }
 
-/// The part of a frame that fits into one WebSocket frame, and whether a message ends there. A text may be several
-/// messages, one per line.
-fn first_piece(frame: &[u8], is_text: bool, room: usize) -> (&[u8], bool) {
+/// The part of a frame that fits into one WebSocket frame, the bytes that it takes from the frame, and whether a message
+/// ends there. A text may be several messages, one per line. The end of a line is not sent.
+fn first_piece(frame: &[u8], is_text: bool, room: usize) -> (&[u8], usize, bool) {
     let offered = frame.get(..room).unwrap_or(frame);
-    if !is_text {
-        return (offered, offered.len() == frame.len());
-    }
-    let end = offered.iter().position(|&byte| byte == b'\n');
-    let line = end.and_then(|end| offered.get(..=end));
-    (line.unwrap_or(offered), line.is_some())
+    let end = || offered.iter().position(|&byte| byte == b'\n');
+    let line = is_text
+        .then(end)
+        .flatten()
+        .and_then(|end| offered.get(..end));
+    line.map_or(
+        (offered, offered.len(), offered.len() == frame.len()),
+        |line| (line, line.len() + 1, true),
+    )
 }

@@ -49,10 +49,7 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
             kp: [50.0; 2],
             ..Gains::default()
         };
-        let setpoint = Setpoint {
-            position: [1.0, -1.0],
-            velocity: [0.0; 2],
-        };
+        let setpoint = Setpoint::at([1.0, -1.0]);
         let mut control = ControlLoop {
             gains,
             setpoint,
