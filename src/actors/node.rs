@@ -593,7 +593,7 @@ pub struct CancelSent {
     pub link: ClientLink,
     /// The goal's id, if it has one.
     pub id: Option<Payload>,
-    /// Whether all goals are cancelled, whoever sent them.
+    /// Whether all goals are cancelled, also those of other clients.
     pub all: bool,
     /// Dropped when the goal has ended.
     pub done: Done,

@@ -321,7 +321,7 @@ impl Registry {
             Op::PublishLines(lines) => return self.publish_lines(origin.from, &lines, ctx),
             Op::CallService(call) => return self.call(origin, call, ctx),
             Op::SendActionGoal(goal) => return self.send_action_goal(origin, goal),
-            Op::CancelActionGoal { action } => return self.cancel_action_goal(origin, &action),
+            Op::CancelActionGoal { action } => return self.cancel_action_goal(&origin, &action),
             Op::Advertise { topic, type_name } => {
                 self.advertise(&origin, &topic, type_name.as_deref())
             }

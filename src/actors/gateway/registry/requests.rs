@@ -44,16 +44,15 @@ impl Registry {
         ctx: &mut Context<Self>,
     ) -> Handled {
         let own = Service::from_name(&call.service);
-        let refusal = match (self.closed, own) {
-            (Some(why), _) => Err(Refusal::Closed(why)),
-            (None, Some(service)) => return self.call_node(service, origin, call),
-            (None, None) if self.action_to_cancel(&call.service).is_some() => {
-                match self.cancel_all_goals(&origin, &call) {
-                    Ok(handled) => return handled,
-                    Err(why) => Err(why),
-                }
-            }
-            (None, None) => {
+        let cancelled = self.action_to_cancel(&call.service);
+        let refusal = match (self.closed, own, cancelled) {
+            (Some(why), ..) => Err(Refusal::Closed(why)),
+            (None, Some(service), _) => return self.call_node(service, origin, call),
+            (None, None, Some(action)) => match self.cancel_all_goals(&origin, &call, action) {
+                Ok(handled) => return handled,
+                Err(why) => Err(why),
+            },
+            (None, None, None) => {
                 let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
                 let (kind, args) = (Served::Service, &call.args);
                 let encode = |spelling: &str, id: &str| messages::call(spelling, id, args);
@@ -158,23 +157,34 @@ impl Registry {
     }
 
     /// Cancels a goal of the same client.
-    pub(super) fn cancel_action_goal(&mut self, origin: FrameOrigin, action: &str) -> Handled {
-        let node = Action::from_name(action).and_then(|action| self.nodes.actions.get(&action));
-        let client = self.clients.get(&origin.from);
-        let Some((node, client)) = node.zip(client) else {
-            if let Err(why) = self.forward_cancellation(&origin, action) {
-                self.refuse(&origin, &why);
+    pub(super) fn cancel_action_goal(&self, origin: &FrameOrigin, action: &str) -> Handled {
+        let at_node = self.cancel_at_node(origin, action, origin.id.clone(), false);
+        at_node.unwrap_or_else(|| {
+            if let Err(why) = self.forward_cancellation(origin, action) {
+                self.refuse(origin, &why);
             }
-            return Handled::at_once();
-        };
+            Handled::at_once()
+        })
+    }
+
+    /// Cancels the client's goal with this id, or all goals, at the node that serves the action. `None` if no node does.
+    fn cancel_at_node(
+        &self,
+        origin: &FrameOrigin,
+        action: &str,
+        id: Option<Payload>,
+        all: bool,
+    ) -> Option<Handled> {
+        let node = self.nodes.actions.get(&Action::from_name(action)?)?;
+        let link = self.clients.get(&origin.from)?.link.clone();
         let (done, ended) = guard();
         node(ActionRequest::Cancel(CancelSent {
-            link: client.link.clone(),
-            id: origin.id,
-            all: false,
+            link,
+            id,
+            all,
             done,
         }));
-        Handled::with(ended)
+        Some(Handled::with(ended))
     }
 
     /// The action whose goals a call of this service cancels, unless a client provides the service itself.
@@ -189,33 +199,23 @@ impl Registry {
         (is_known && !has(Served::Service, service)).then_some(action)
     }
 
-    /// Cancels all goals of an action, whoever sent them, as the service of ROS 2 does. The goals end after the answer.
+    /// Cancels all goals of an action, also those of other clients, as the service of ROS 2 does. The goals end after the
+    /// answer.
     fn cancel_all_goals(
         &mut self,
         origin: &FrameOrigin,
         call: &CallService,
+        action: &str,
     ) -> Result<Handled, Refusal> {
-        let no_action = || NoService::NoProvider(call.service.clone());
-        let action = names::cancelled_action(&call.service).ok_or_else(no_action)?;
         if !call.args.get().bytes().all(|byte| b"{}[] ".contains(&byte)) {
             return Err(Refusal::OneGoal);
         }
-        let client = self.clients.get(&origin.from).ok_or_else(no_action)?;
-        let link = client.link.clone();
-        let own = Action::from_name(action).and_then(|action| self.nodes.actions.get(&action));
-        let handled = if let Some(node) = own {
-            let (done, ended) = guard();
-            let (id, all) = (None, true);
-            node(ActionRequest::Cancel(CancelSent {
-                link,
-                id,
-                all,
-                done,
-            }));
-            Handled::with(ended)
-        } else {
-            self.forward_all_cancellations(action)?;
-            Handled::at_once()
+        let handled = match self.cancel_at_node(origin, action, None, true) {
+            Some(handled) => handled,
+            None => {
+                self.forward_all_cancellations(action)?;
+                Handled::at_once()
+            }
         };
         let values = json!({"return_code": 0, "goals_canceling": []});
         let id = origin.id.as_ref();
