@@ -83,10 +83,10 @@ impl Model {
         }
     }
 
-    /// A client misses messages: allowed only if it did not read, or if memory was scarce.
+    /// A client misses messages: allowed only if it did not read, if memory was scarce, or if its pipe was too narrow.
     pub fn miss(&mut self, court: &Court, honest: &Honest, count: usize, which: &str) {
         self.missed += count as u64;
-        if !honest.is_hampered && !self.is_scarce {
+        if !honest.is_hampered && !self.is_scarce && !self.is_overrun {
             court.wrong(format!(
                 "client {} lacks {count} messages {which}",
                 honest.who

@@ -114,12 +114,14 @@ pub struct Model {
     pub services: BTreeMap<String, Provided>,
     /// Calls that providers have received and not yet answered.
     pub asked: Vec<Asked>,
-    /// Calls whose caller has disconnected: their provider is notified.
+    /// Calls whose caller has left, or had to wait too long: their provider hears that there is no such call.
     pub orphans: u64,
     /// Messages that were dropped for a client that did not read.
     pub missed: u64,
     /// Whether scarce memory justifies refusals and losses.
     pub is_scarce: bool,
+    /// Whether the arm was stepped by hand, so that feedback of half a minute comes at once through a narrow pipe.
+    pub is_overrun: bool,
     /// Whether a client has cancelled goals without naming their owner.
     pub ends_any_goal: bool,
 }
@@ -215,9 +217,9 @@ impl Model {
                     provided.changed = court.turns.get();
                 }
             }
-            _ if honest.mistakes > 0 => honest.mistakes -= 1,
             _ if honest.is_excused => {}
             _ if self.orphans > 0 && msg.contains("no call of") => self.orphans -= 1,
+            _ if honest.mistakes > 0 => honest.mistakes -= 1,
             _ => court.wrong(format!(
                 "client {} has made no mistake and hears {text:.300}",
                 honest.who

@@ -14,7 +14,7 @@ use crate::honest::Honest;
 use crate::hostile::Hostile;
 use crate::model::Model;
 use crate::pipe::Fate;
-use crate::plan::{Burst, Feature, Plan};
+use crate::plan::{Burst, Feature, Hostility, Plan};
 use crate::workload::{UniqueNumbers, Workload};
 use crate::world::{World, in_virtual_time};
 
@@ -166,6 +166,7 @@ impl Course {
             if self.hostile[at].client.has_ended() {
                 self.hostile[at] = self.intrude();
             }
+            self.model.is_overrun |= deed == Hostility::StepByHand && self.plan.room < FLOODED_ROOM;
             self.hostile[at].perform(deed, &self.court, &self.honest);
         } else if !self.plan.bursts.is_empty() && self.court.chance(self.plan.burst) {
             if let Some(burst) = self.court.weighed(&self.plan.bursts) {

@@ -104,13 +104,7 @@ impl Course {
                 self.model.miss(&self.court, one, numbers.len(), &which);
             }
         }
-        let dropped = self.world.gauges.messages_dropped();
-        if self.model.missed > dropped {
-            self.court.wrong(format!(
-                "{} messages are missing, and {dropped} counted as dropped",
-                self.model.missed
-            ));
-        }
+        self.check_dropped();
     }
 
     /// All disconnect, some with a close frame; no memory is held afterwards.

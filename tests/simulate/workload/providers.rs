@@ -103,7 +103,7 @@ impl Workload<'_> {
             // Its caller may already have received a timeout, or may have disconnected.
             let forward = self.model.forwards.get(&number);
             if forward.is_none_or(|one| one.since + one.timeout <= now) {
-                self.me().mistakes += 1;
+                self.model.orphans += 1;
             }
             self.send(&frame);
         }

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bytes::Bytes;
 use serde_json::value::RawValue;
 
+use super::Subscriber;
 use crate::actors::resources::memory::{Permit, cover_message};
 use crate::protocol::messages;
 use crate::protocol::names::OWN_ID_PREFIX;
@@ -32,10 +33,13 @@ pub(super) struct Made {
 /// A message, or a series of messages, to encode in another form.
 pub(super) struct ToEncode {
     /// The topic, as the subscribers spell it.
-    pub(super) spelling: Box<str>,
+    pub(super) spelling: Arc<str>,
     pub(super) plain: Bytes,
     /// The form.
     pub(super) encoding: Encoding,
+    /// The `spelling` of each subscriber that requested this form when the message was published. It is the
+    /// subscriber's own allocation, so one that unsubscribes and subscribes again is another.
+    pub(super) recipients: Vec<Arc<str>>,
     /// The type of the topic's messages, if it is known.
     pub(super) type_name: Option<&'static str>,
     /// Number of messages sent in fragments. It is part of the fragments' ids.
@@ -45,6 +49,11 @@ pub(super) struct ToEncode {
 }
 
 impl ToEncode {
+    /// Whether the subscriber requested this form.
+    pub(super) fn suits(&self, subscriber: &Subscriber) -> bool {
+        (&*self.spelling, self.encoding) == (&*subscriber.spelling, subscriber.encoding)
+    }
+
     /// Whether it is so long that a worker thread must encode it.
     pub(super) fn is_long(&self) -> bool {
         self.plain.len() > ENCODED_HERE
@@ -113,6 +122,7 @@ mod tests {
                     compression,
                     ..Encoding::default()
                 },
+                recipients: Vec::new(),
                 type_name: Some("std_msgs/msg/Float64MultiArray"),
                 fragmented: Arc::default(),
                 permit: None,

@@ -319,8 +319,7 @@ impl Registry {
     fn fan_out(&self, topic: &str, encode: impl Fn(&str) -> Bytes) -> Delivered {
         let subscribers = self.topics.subscribers(topic);
         let mut plain: Vec<(&str, Bytes)> = Vec::new();
-        let mut others: Vec<(&str, Encoding)> = Vec::new();
-        let mut long = Vec::new();
+        let mut others: Vec<ToEncode> = Vec::new();
         for subscriber in subscribers {
             let (spelling, encoding) = (&*subscriber.spelling, subscriber.encoding);
             let known = plain.iter().find(|(known, _)| *known == spelling);
@@ -332,21 +331,20 @@ impl Registry {
                     frame
                 }
             };
+            let mut forms = others.iter_mut();
             if is_sent_plain(encoding, frame.len()) {
                 deliver(subscriber, frame);
-            } else if !others.contains(&(spelling, encoding)) {
-                if frame.len() > MEDIUM && plain.len() + others.len() >= MAX_LONG_FORMS {
-                    self.gauges.add_dropped(1);
-                    continue;
-                }
-                others.push((spelling, encoding));
-                let message = self.to_encode(spelling, frame, encoding);
-                if message.is_long() {
-                    long.push(message);
-                } else {
-                    self.deliver_made(&message, &message.make());
-                }
+            } else if let Some(known) = forms.find(|form| form.suits(subscriber)) {
+                known.recipients.push(Arc::clone(&subscriber.spelling));
+            } else if frame.len() > MEDIUM && plain.len() + others.len() >= MAX_LONG_FORMS {
+                self.gauges.add_dropped(1);
+            } else {
+                others.push(self.to_encode(subscriber, frame));
             }
+        }
+        let (long, short) = others.into_iter().partition(ToEncode::is_long);
+        for message in short {
+            self.deliver_made(&message, &message.make());
         }
         let count = subscribers.len();
         Delivered { count, long }
@@ -368,21 +366,25 @@ impl Registry {
         for message in long {
             let done = Done::clone(done);
             let kind = WorkKind::of(message.plain.len());
+            let count = message.recipients.len() as u64;
             let making = run_long_work(kind, move || (message.make(), message));
             ctx.spawn(making.into_actor(self).map(move |made, registry, _| {
-                if let Some((made, message)) = made {
-                    registry.deliver_made(&message, &made);
+                match made {
+                    Some((made, message)) => registry.deliver_made(&message, &made),
+                    None => registry.gauges.add_dropped(count),
                 }
                 drop(done);
             }));
         }
     }
 
-    /// Delivers a message in one form to the subscribers that requested that form.
+    /// Delivers a message in one form to its recipients that are still subscribed, even if they have requested another
+    /// form since.
     fn deliver_made(&self, message: &ToEncode, made: &Made) {
         let topic = names::absolute(&message.spelling);
         for subscriber in self.subscribers_as(&topic, &message.spelling) {
-            if subscriber.encoding == message.encoding {
+            let mut recipients = message.recipients.iter();
+            if recipients.any(|one| Arc::ptr_eq(one, &subscriber.spelling)) {
                 self.deliver_form(subscriber, made);
             }
         }
@@ -414,7 +416,7 @@ impl Registry {
             if is_sent_plain(subscriber.encoding, plain.len()) {
                 return deliver(subscriber, plain);
             }
-            let message = self.to_encode(spelling, plain, subscriber.encoding);
+            let message = self.to_encode(subscriber, plain);
             self.deliver_form(subscriber, &message.make());
         }
     }
@@ -427,13 +429,14 @@ impl Registry {
         }
     }
 
-    /// A JSON frame, or a series of frames, to encode in another form.
-    fn to_encode(&self, spelling: &str, plain: Bytes, encoding: Encoding) -> ToEncode {
+    /// A JSON frame, or a series of frames, to encode in the form that the subscriber requested.
+    fn to_encode(&self, subscriber: &Subscriber, plain: Bytes) -> ToEncode {
         ToEncode {
-            spelling: spelling.into(),
+            spelling: Arc::clone(&subscriber.spelling),
             plain,
-            encoding,
-            type_name: self.known_type(spelling),
+            encoding: subscriber.encoding,
+            recipients: vec![Arc::clone(&subscriber.spelling)],
+            type_name: self.known_type(&subscriber.spelling),
             fragmented: Arc::clone(&self.fragmented),
             permit: self.permit.clone(),
         }
