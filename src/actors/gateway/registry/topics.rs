@@ -382,18 +382,15 @@ impl Registry {
     /// form since.
     fn deliver_made(&self, message: &ToEncode, made: &Made) {
         let topic = names::absolute(&message.spelling);
-        for subscriber in self.subscribers_as(&topic, &message.spelling) {
-            let mut recipients = message.recipients.iter();
-            if recipients.any(|one| Arc::ptr_eq(one, &subscriber.spelling)) {
+        // Both lists have the same order.
+        let mut left = self.topics.subscribers(&topic).iter();
+        for recipient in &message.recipients {
+            let mut rest = left.clone();
+            if let Some(subscriber) = rest.find(|one| Arc::ptr_eq(recipient, &one.spelling)) {
                 self.deliver_form(subscriber, made);
+                left = rest;
             }
         }
-    }
-
-    /// The subscribers to `topic`, an absolute name, under this spelling.
-    fn subscribers_as(&self, topic: &str, spelling: &str) -> impl Iterator<Item = &Subscriber> {
-        let subscribers = self.topics.subscribers(topic).iter();
-        subscribers.filter(move |one| *one.spelling == *spelling)
     }
 
     /// Delivers the messages of a form. Messages that could not be made count as dropped.
@@ -410,8 +407,9 @@ impl Registry {
         let Some((topic, Some(frame))) = latched else {
             return;
         };
-        let mut subscribers = self.subscribers_as(topic.name(), spelling);
-        if let Some(subscriber) = subscribers.find(|one| one.connection == to) {
+        let mut all = self.topics.subscribers(topic.name()).iter();
+        if let Some(subscriber) = all.find(|one| one.connection == to && *one.spelling == *spelling)
+        {
             let plain = messages::respelled(topic.name(), spelling, frame);
             if is_sent_plain(subscriber.encoding, plain.len()) {
                 return deliver(subscriber, plain);
