@@ -207,12 +207,8 @@ impl Registry {
         call: &CallService,
         action: &str,
     ) -> Result<Handled, Refusal> {
-        if !call
-            .args
-            .get()
-            .bytes()
-            .all(|byte| b"{}[] \t\r\n".contains(&byte))
-        {
+        let mut args = call.args.get().bytes();
+        if !args.all(|byte| b"{}[] \t\r\n".contains(&byte)) {
             return Err(Refusal::OneGoal);
         }
         let handled = match self.cancel_at_node(origin, action, None, true) {
