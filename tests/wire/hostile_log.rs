@@ -3,12 +3,12 @@
 //!
 //! **Invariant:** the program logs into a pipe that is read to its end, so no line is missed.
 
-use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::thread;
 
-use crate::common::{Client, Logged, end, program, signal};
+use crate::command::Going;
+use crate::common::{Client, Logged, end, program};
 use pendularm::logging::{LINE_BYTES, QUEUE_LINES};
 use serde_json::{Value, json};
 
@@ -130,30 +130,23 @@ fn send_heads(address: SocketAddr, text: &str) {
 fn an_unread_log_blocks_no_client_and_lost_lines_are_counted() {
     const CLIENTS: usize = 2 * QUEUE_LINES + 64 * 1024 / 50;
     for format in ["text", "json"] {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_pendularm"))
-            .args("--bind 127.0.0.1:0 --log debug --clients 4096".split(' '))
-            .args(["--log-format", format])
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        let mut stdout = BufReader::new(child.stdout.take().unwrap());
-        stdout.read_line(&mut line).unwrap();
+        let options = "--bind 127.0.0.1:0 --log debug --clients 4096 --log-format";
+        let mut command = program();
+        let mut child = Going::of(command.args(options.split(' ')).arg(format));
+        let line = child.line();
         let address: SocketAddr = line.split(' ').next_back().unwrap().trim().parse().unwrap();
         for _ in 0..CLIENTS {
             std::net::TcpStream::connect(address).unwrap();
         }
         Client::to(address).settle();
         let log = thread::spawn({
-            let stderr = child.stderr.take().unwrap();
+            let stderr = child.0.stderr.take().unwrap();
             move || std::io::read_to_string(stderr).unwrap()
         });
         // The thread of the log continues, and has time for its last lines.
         thread::sleep(std::time::Duration::from_secs(1));
-        signal(child.id(), "TERM");
-        assert!(end(&mut child).0.success());
+        child.terminate();
+        assert!(end(&mut child.0).0.success());
         let log = log.join().unwrap();
         assert_records(format, &log);
         let lost = log.lines().filter_map(|line| {

@@ -1,10 +1,9 @@
 //! How the program starts, refuses to start, and what it prints.
 
-use std::io::{BufRead, BufReader, Read};
 use std::net::TcpListener;
-use std::process::Stdio;
 
-use crate::common::{self, Client, Runtime, program, signal};
+use crate::command::Going;
+use crate::common::{Client, Runtime, program};
 use serde_json::json;
 
 #[test]
@@ -23,16 +22,8 @@ fn the_version_goes_to_standard_output_with_status_0() {
 
 #[test]
 fn standard_output_has_the_listening_line_and_nothing_else() {
-    let mut child = program()
-        .args(["--bind", "127.0.0.1:0", "--log", "trace"])
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut stdout = BufReader::new(child.stdout.take().unwrap());
-    let mut line = String::new();
-    stdout.read_line(&mut line).unwrap();
+    let mut child = Going::of(program().args(["--bind", "127.0.0.1:0", "--log", "trace"]));
+    let line = child.line();
     let address = line.trim_end().strip_prefix("listening on ").expect(&line);
     let mut client = Client::to(address.parse().unwrap());
     assert!(address.starts_with("127.0.0.1:"), "{line}");
@@ -41,12 +32,10 @@ fn standard_output_has_the_listening_line_and_nothing_else() {
     // Far beyond stability: the divergence is logged.
     client.ask("/arm_sim/set_params", json!({"gravity": 1e308}));
     client.settle();
-    signal(child.id(), "TERM");
+    child.terminate();
     // Standard error has not been read so far, and the program must still end.
-    assert_eq!(common::end(&mut child).0.code(), Some(0));
-    let mut rest = String::new();
-    stdout.read_to_string(&mut rest).unwrap();
-    assert_eq!(rest, "");
+    let (status, rest, _) = child.end();
+    assert_eq!((status, &*rest), (Some(0), ""));
 }
 
 #[test]

@@ -2,10 +2,11 @@
 //! files of a package.
 
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
+use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use super::Going;
 use crate::common::{self, Runtime, complaint};
 use crate::folder::Folder;
 
@@ -80,16 +81,10 @@ fn a_token_is_shown_from_the_option_or_the_variable() {
 fn a_closed_pipe_ends_a_command_without_an_error() {
     let runtime = Runtime::start();
     for command in [COMMANDS[1], COMMANDS[2], "topic pub /chatter {} -r 100"] {
-        let mut child = program(&format!("{command} --connect {}", runtime.address))
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().unwrap())
-            .read_line(&mut line)
-            .unwrap();
-        assert!(!line.is_empty());
+        let mut child = Going::start(&runtime, command);
+        assert!(!child.line().is_empty());
+        let Going(child, pipe) = child;
+        drop(pipe);
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{command:?}");
         assert!(

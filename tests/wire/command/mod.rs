@@ -40,8 +40,7 @@ fn command(runtime: &Runtime, arguments: &[&str]) -> std::process::Command {
         .args(verb)
         .args(["--connect", &runtime.address.to_string()])
         .args(["--timeout", &common::PATIENCE.as_secs().to_string()])
-        .args(rest)
-        .stdin(Stdio::null());
+        .args(rest);
     command
 }
 
@@ -80,12 +79,17 @@ fn refusal(runtime: &Runtime, line: &str, status: i32) -> String {
     common::complaint(&ask(runtime, line), status)
 }
 
-/// A command that keeps running, and its output line by line.
-struct Going(Child, BufReader<std::process::ChildStdout>);
+/// A program that keeps running, and its output line by line.
+pub struct Going(pub Child, pub BufReader<std::process::ChildStdout>);
 
 impl Going {
     fn start(runtime: &Runtime, line: &str) -> Self {
-        let mut child = command_line(runtime, line)
+        Self::of(&mut command_line(runtime, line))
+    }
+
+    pub fn of(program: &mut std::process::Command) -> Self {
+        let mut child = program
+            .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -94,7 +98,7 @@ impl Going {
         Self(child, lines)
     }
 
-    fn line(&mut self) -> String {
+    pub fn line(&mut self) -> String {
         let mut line = String::new();
         self.1.read_line(&mut line).unwrap();
         line
@@ -105,12 +109,12 @@ impl Going {
     }
 
     /// Ends it. SIGINT is ignored if whoever started the tests ignores it.
-    fn terminate(&self) {
+    pub fn terminate(&self) {
         signal(self.0.id(), "TERM");
     }
 
     /// Exit status, the rest of standard output, and standard error.
-    fn end(self) -> (Option<i32>, String, String) {
+    pub fn end(self) -> (Option<i32>, String, String) {
         let Self(child, mut lines) = self;
         let mut rest = String::new();
         std::io::Read::read_to_string(&mut lines, &mut rest).unwrap();
