@@ -87,9 +87,10 @@ pub struct Provided {
 }
 
 impl Provided {
-    /// Nobody provides it any more.
+    /// Nobody provides it any more, once its last provider's frames have all been handled.
     pub fn none(changed: u64) -> Self {
         Self {
+            is_contested: true,
             changed,
             ..Self::default()
         }
