@@ -76,6 +76,7 @@ fn a_record_beyond_the_limit_of_file_sizes_ends_with_an_error_and_clients_are_se
         "{told}"
     );
     assert_ne!(told["stamp"], json!({"sec": 0, "nanosec": 0}));
+    assert!(told["stamp"]["sec"].as_u64().is_some(), "{told}");
     let text = told["msg"].as_str().unwrap();
     assert!(
         text.contains("the record ends") && text.contains("File too large"),
