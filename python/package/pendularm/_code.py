@@ -58,5 +58,5 @@ def _told(name: str, value: Any, around: tuple[int, ...]) -> str:
             held = [cell.cell_contents for cell in value.__closure__ or ()]
             return f"function ({each([value.__code__, value.__defaults__, value.__kwdefaults__, held])})"
     raise ValueError(
-        f"{name} must hold only plain values, because a folder identifies it by its code and these, got {value!r:.60}"
+        f"{name} must be a function that holds only plain values: a folder identifies it by them, got {value!r:.60}"
     )
