@@ -73,7 +73,7 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   const places = {
     setpoint: `at the setpoint ${named}`, sagging: `at the pose to which it sags, ${named}`, saddle: `at the pose to which it falls, ${named}`,
     hanging: state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns",
-    unstable: free ? `at ${named}` : `at ${named}, where the gains themselves are at fault`,
+    unstable: free ? `at ${named}` : `at ${named}, which these gains cannot hold`,
   };
   const place = places[/** @type {keyof typeof places} */ (answer.equilibrium_kind ?? (free ? "hanging" : "setpoint"))];
   const moving = motion < held;
