@@ -43,7 +43,7 @@ const shortcuts = [
 /** @type {Map<string, () => void>} */
 const actions = new Map(shortcuts.map(([key, , act]) => /** @type {any} */ ([key, act])));
 
-/** After key 0, choosing an integrator resumes the arm, as on the classic page. */
+/** After key 0, choosing an integrator resumes the arm. */
 async function useMethod(method, name) {
   const goOn = stoppedByZero;
   stoppedByZero = false;

@@ -73,7 +73,7 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   const places = {
     setpoint: `at the setpoint ${named}`, sagging: `at the pose to which it sags, ${named}`, saddle: `at the pose to which it falls, ${named}`,
     hanging: state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns",
-    unstable: free ? `at ${named}` : `at ${named}, where the gains themselves are at fault`,
+    unstable: free ? `at ${named}` : `at ${named}, which these gains cannot hold`,
   };
   const place = places[/** @type {keyof typeof places} */ (answer.equilibrium_kind ?? (free ? "hanging" : "setpoint"))];
   const moving = motion < held;
@@ -274,7 +274,7 @@ export function cause({ critical, minimum_over_poses_held: least, equilibrium_ki
 export function others(limits) {
   const finite = Object.values(limits);
   const [least, most] = [Math.min(...finite), Math.max(...finite)];
-  if (most <= ALIKE * least) return "A better method does not help: the controller acts only once a step. It only makes the simulated motion more exact.";
+  if (most <= ALIKE * least) return "A better method does not help, because the controller acts only once a step. A better method only makes the simulated motion more exact.";
   const best = METHODS.filter(([method]) => limits[method] > most / ALIKE).map(([, name]) => name);
   return `${best.join(", ")}: stable up to ${limitText(most)}.`;
 }

@@ -53,7 +53,7 @@ pub(crate) fn read<const N: usize>(
         let is_one = |name: String| ["kp", "ki", "kd"].contains(&name.as_str());
         if !name.extract().is_ok_and(is_one) {
             return Err(refused(format_args!(
-                "gains has kp, ki and kd, got {}",
+                "gains must have only kp, ki and kd, got {}",
                 shown(&name)
             )));
         }

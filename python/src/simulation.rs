@@ -236,7 +236,8 @@ impl Simulation {
         match (&self.own, &arm.chain()?) {
             (Either::Two(one), Chain::Two(arm)) => hold(py, one).set_arm(*arm),
             (Either::Three(one), Chain::Three(arm)) => hold(py, one).set_arm(*arm),
-            _ => return Err(refused("arm must have as many links as the one before")),
+            (Either::Two(_), _) => return Err(refused("arm must have 2 links, got 3")),
+            (Either::Three(_), _) => return Err(refused("arm must have 3 links, got 2")),
         }
         Ok(())
     }

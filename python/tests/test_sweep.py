@@ -318,7 +318,7 @@ def test_a_function_may_be_the_metric():
     # The nearest whole step of each.
     assert found["last"].tolist() == [1.0, 333 * 0.003, 1.0]
     assert (found["largest"] > 1).all()
-    with pytest.raises(ValueError, match="metric must return one number for each of 2 arms, got metric of shape"):
+    with pytest.raises(ValueError, match="metric must return one number for each of 2 arms, got the shape"):
         pendularm.sweep({"kp": [1, 2]}, lambda run: run.positions, duration=0.1)
 
 

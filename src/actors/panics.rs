@@ -1,7 +1,7 @@
 //! Containment of panics: a panic ends one client or computation, or the process.
 //!
 //! No input is known to cause a panic. A panic while serving one client ends that client, and a panic in a computation
-//! ends that computation. Anywhere else, in a node or the registry, clients would wait for ever. There the process
+//! ends that computation. Anywhere else, in a node or the registry, clients would wait without end. There the process
 //! ends at once, with one line that names the place, so a supervisor can restart it.
 //!
 //! **Invariant:** a caller of [`contain`] contains a panic, or the process ends.

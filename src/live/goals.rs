@@ -146,7 +146,7 @@ impl<const N: usize> Goals<N> {
     /// Ends the goal, if there is one, in the arm's present state.
     pub(super) fn preempt(&mut self, simulation: &Simulation<N>) -> Option<GoalProgress<N>> {
         let tracked = self.tracked.take()?;
-        let mut progress = tracked.stands(simulation, self.past);
+        let mut progress = tracked.progress(simulation, self.past);
         progress.outcome = Some(Outcome::Preempted);
         self.latest = Some(progress);
         Some(progress)
@@ -166,7 +166,7 @@ impl Tracked {
         if !reached && !due {
             return (None, None);
         }
-        let progress = self.stands(simulation, past);
+        let progress = self.progress(simulation, past);
         let end = GoalProgress {
             outcome: Some(Outcome::Reached),
             ..progress
@@ -174,7 +174,7 @@ impl Tracked {
         (due.then_some(progress), reached.then_some(end))
     }
 
-    fn stands<const N: usize>(&self, simulation: &Simulation<N>, past: Past) -> GoalProgress<N> {
+    fn progress<const N: usize>(&self, simulation: &Simulation<N>, past: Past) -> GoalProgress<N> {
         GoalProgress {
             number: self.number,
             distance: self.goal.distance(end_effector(simulation)),

@@ -20,7 +20,7 @@ pub enum ArmEvent<const N: usize> {
     /// The start of the journal, an input that has taken effect, or a divergence.
     Noted(StepNote<N>),
     /// The arm's state.
-    Stands {
+    State {
         /// Positions and velocities.
         state: State<N>,
         /// Effort of the latest step \[N m\].
@@ -37,7 +37,7 @@ pub struct Journal<const N: usize> {
     /// Steps taken up to the latest reset.
     before_reset: u64,
     /// The step of the latest recorded state.
-    stood: Option<u64>,
+    state_step: Option<u64>,
     /// The listener has all events since the whole simulation.
     is_whole: bool,
 }
@@ -49,7 +49,7 @@ impl<const N: usize> Journal<N> {
         Self {
             listener,
             before_reset: 0,
-            stood: None,
+            state_step: None,
             is_whole: false,
         }
     }
@@ -82,12 +82,12 @@ impl<const N: usize> Journal<N> {
             self.is_whole = self.say(steps, ArmEvent::Noted(whole));
         }
         let step = self.before_reset + steps;
-        if self.is_whole && self.stood != Some(step) {
-            self.stood = Some(step);
+        if self.is_whole && self.state_step != Some(step) {
+            self.state_step = Some(step);
             // A missed state is skipped. Later ones are still compared.
             self.say(
                 steps,
-                ArmEvent::Stands {
+                ArmEvent::State {
                     state: *simulation.state(),
                     effort: *simulation.effort(),
                 },

@@ -1,5 +1,5 @@
 //! The live arm without an actor: steps that are due, requests, goals, limits, topics. The node `arm_sim` runs it on a
-//! thread of its own, and the page without a server in its worker.
+//! thread of its own, and the page in one file in its worker.
 //!
 //! The arm gets the time from its environment ([`World`]), and passes its messages there. `math::pacer` computes
 //! the number of due steps, and `math::simulation` each step.

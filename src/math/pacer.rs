@@ -36,7 +36,7 @@ const SLACK: f64 = 1.0 + 2.0 * f64::EPSILON;
 ///
 /// let mut pacer = Pacer::new(Duration::ZERO, 0.1);
 /// assert_eq!(pacer.due(Duration::from_millis(230)), 2);
-/// pacer.took(1); // the rest stays owed
+/// pacer.took(1); // the other step stays due
 /// assert_eq!(pacer.due(Duration::from_millis(300)), 2);
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -71,14 +71,14 @@ impl Pacer {
     /// progress are dropped. No step is due at a `now` before the last one.
     pub fn due(&mut self, now: Duration) -> u64 {
         let most = self.whole_steps(CATCH_UP).saturating_add(1);
-        let due = self.owed(now);
+        let due = self.steps_due(now);
         if due <= most {
             return due;
         }
         let step = Duration::try_from_secs_f64(self.timestep).unwrap_or_default();
         self.anchor = now.saturating_sub(CATCH_UP.saturating_add(step));
         self.taken = 0;
-        self.owed(now).min(most)
+        self.steps_due(now).min(most)
     }
 
     /// Records that `steps` steps were taken, possibly fewer than were due.
@@ -96,7 +96,7 @@ impl Pacer {
         now.saturating_sub(self.anchor).as_secs_f64() - self.taken as f64 * self.timestep
     }
 
-    fn owed(&self, now: Duration) -> u64 {
+    fn steps_due(&self, now: Duration) -> u64 {
         self.whole_steps(now.saturating_sub(self.anchor))
             .saturating_sub(self.taken)
     }

@@ -86,7 +86,7 @@ pub struct Options {
     #[arg(default_value = "text")]
     #[arg(value_parser = ValueReader(|text| one_of(&[("text", LogFormat::Text), ("json", LogFormat::Json)], text)))]
     pub log_format: LogFormat,
-    /// Secret token of at least 16 characters; prefer the variable, because other users can see options
+    /// Secret token of 16 to 256 characters; prefer the variable, because other users can see options
     #[arg(long, env = "ARM_SIM_TOKEN", value_name = "TOKEN", value_parser = ValueReader(Token::read))]
     pub token: Option<Token>,
     /// New file for a record of the run, as MCAP

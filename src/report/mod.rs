@@ -40,7 +40,7 @@ pub struct ReportOptions {
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     #[arg(value_parser = PossibleValuesParser::new(sections()))]
     pub only: Vec<String>,
-    /// A coarse report in seconds
+    /// A coarse report in less than a minute
     #[arg(long)]
     pub quick: bool,
 }

@@ -1,5 +1,5 @@
 //! The services: the typed requests, their readers, and the writers of their answers. Both the runtime and the
-//! page without a server use these functions.
+//! page in one file use these functions.
 //!
 //! **Invariant:** these are plain values, without actors, sockets or clocks. A response has the service's name and the
 //! `id` as the caller spelled them.

@@ -18,7 +18,7 @@ use crate::math::integrator::Method;
 pub const ADVISED_PART: f64 = 0.8;
 
 /// Advised part if some pose is unstable in continuous time. A link can spin then, which changes the inertia of the
-/// joints before it. One such arm, with Verlet, spun for ever at 0.76 of its smallest limit over poses at rest.
+/// joints before it. One such arm, with Verlet, kept spinning at 0.76 of its smallest limit over poses at rest.
 const SPINNING_PART: f64 = 0.5;
 
 /// Largest relative distance from the bound at which the smallest limit found counts as certified.

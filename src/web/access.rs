@@ -85,7 +85,7 @@ pub enum AccessError {
     /// A foreign name.
     #[error(
         "this runtime does not answer to the host {host:?}: it could be another site's name that points here. Ask for \
-         http://localhost:{port}/, or start the runtime with --allow-host and that name (without a port, to allow \
+         http://localhost:{port}/, or start pendularm with --allow-host and that name (without a port, to allow \
          every port)"
     )]
     Host {
@@ -97,7 +97,7 @@ pub enum AccessError {
     /// A page that may not open a WebSocket.
     #[error(
         "a page of the origin {0:?} may not open a WebSocket here: it could drive the arm without your knowledge. \
-         If it may, start the runtime with --allow-origin and that origin"
+         If it may, start pendularm with --allow-origin and that origin"
     )]
     Origin(String),
     /// The token is missing.

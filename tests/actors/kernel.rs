@@ -1,4 +1,4 @@
-//! The kernel of the page without a server gives the same answers as the runtime to the same frames at the same times.
+//! The kernel of the page in one file gives the same answers as the runtime to the same frames at the same times.
 //!
 //! Both begin at one instant of virtual time. Only one of them can measure run times, so these are left out.
 

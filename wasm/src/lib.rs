@@ -1,4 +1,4 @@
-//! The arm in a page, without a server: rosbridge frames in, rosbridge frames out.
+//! The arm of the page in one file: rosbridge frames in, rosbridge frames out.
 //!
 //! A [`Kernel`] replaces the runtime's actors for one client, in one thread and without a socket. The runtime's own
 //! functions read, execute and answer requests: `pendularm::services` and `pendularm::live`. `module.rs` exports it as

@@ -57,4 +57,6 @@ def _told(name: str, value: Any, around: tuple[int, ...]) -> str:
         case FunctionType():
             held = [cell.cell_contents for cell in value.__closure__ or ()]
             return f"function ({each([value.__code__, value.__defaults__, value.__kwdefaults__, held])})"
-    raise ValueError(f"{name} must be a function whose code says all where a folder is given; it holds {value!r:.60}")
+    raise ValueError(
+        f"{name} must be a function that holds only plain values: a folder identifies it by them, got {value!r:.60}"
+    )

@@ -344,13 +344,13 @@ def _solve(question: _Question, start: int, stop: int, stopped: threading.Event 
     found = metric(run)
     named = found if isinstance(found, Mapping) else {name: found}
     if hidden := [key for key, one in named.items() if is_masked(one)]:
-        raise ValueError(f"metric must return no masked numbers, got {hidden[0]} of them")
+        raise ValueError(f"metric must return no masked numbers, got some in {hidden[0]!r}")
     values = {key: np.asarray(one) for key, one in named.items()}
     for key, one in values.items():
         if not isinstance(key, str):
             raise ValueError(f"metric must name its numbers by text, got {key!r}")
         if one.dtype.hasobject:
-            raise ValueError(f"metric must return numbers or text, got {key} of objects")
+            raise ValueError(f"metric must return numbers or text, got objects in {key!r}")
         if one.shape != (arms,):
-            raise ValueError(f"metric must return one number for each of {arms} arms, got {key} of shape {one.shape}")
+            raise ValueError(f"metric must return one number for each of {arms} arms, got the shape {one.shape} in {key!r}")
     return values

@@ -20,7 +20,7 @@ pub fn arm<const N: usize>(
                 step,
                 note: write_note(&note),
             },
-            ArmEvent::Stands { state, effort } => Content::State {
+            ArmEvent::State { state, effort } => Content::State {
                 step,
                 position: state.position.to_vec(),
                 velocity: state.velocity.to_vec(),

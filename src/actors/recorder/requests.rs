@@ -58,7 +58,7 @@ pub struct RecordTo(pub Option<PathBuf>);
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotRecorded {
     /// The operator has set no folder.
-    #[error("recording by service needs a folder: start the program with --record-dir")]
+    #[error("recording by service needs a folder: start pendularm with --record-dir")]
     NoFolder,
     /// There is a record already.
     #[error("already recording to {0}")]

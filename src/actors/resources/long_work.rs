@@ -23,7 +23,7 @@ pub const PLACES: usize = 2;
 pub enum WorkKind {
     /// Reads a frame or encodes a message.
     Usual,
-    /// The same for more than [`MEDIUM`] bytes. Shorter work does not wait for it.
+    /// The same for more than [`MEDIUM`] bytes. Shorter work has places of its own.
     Long,
     /// Writes a long list. It keeps its place while it waits for memory for its answer.
     Listing,

@@ -10,7 +10,7 @@ use glam::DVec2;
 pub struct EndEffector {
     /// Its position \[m\].
     pub position: DVec2,
-    /// Heading of the last link, `φₙ = q₁ + … + qₙ` \[rad\], not wrapped.
+    /// Orientation of the last link, `φₙ = q₁ + … + qₙ` \[rad\], not wrapped.
     pub orientation: f64,
 }
 

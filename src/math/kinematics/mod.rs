@@ -6,8 +6,8 @@
 //! | question | function | file |
 //! | --- | --- | --- |
 //! | where is the end effector? | [`forward()`], [`joints`], [`heading`] | `forward.rs` |
-//! | how must the joints stand? | [`solve`] | `inverse.rs` |
-//! | which of all equal angles is meant? | [`wrap`], [`turn`], [`nearest_turn`] | `angle.rs` |
+//! | which joint angles reach a target? | [`solve`] | `inverse.rs` |
+//! | which of the angles that differ by whole turns? | [`wrap`], [`turn`], [`nearest_turn`] | `angle.rs` |
 //!
 //! **Invariant:** finite input gives a finite answer or an [`Unreachable`], never NaN, at any ratio of lengths.
 
@@ -28,7 +28,7 @@ pub use inverse::{BOUNDARY, solve};
 pub struct Target {
     /// The place for the end effector \[m\].
     pub position: DVec2,
-    /// Heading of the last link, `φₙ` \[rad\]. If it is absent, any possible heading. Ignored for 2 links.
+    /// Orientation of the last link, `φₙ` \[rad\]. If it is absent, any possible one. Ignored for 2 links.
     pub orientation: Option<f64>,
 }
 

@@ -41,7 +41,7 @@ use super::dynamics::{forward_dynamics, weightless_dynamics};
 use super::integrator::Method;
 use super::pid::{Control, Gains, Pid, Setpoint};
 
-/// Default timestep \[s\]: a third of the stability limit of the default gains.
+/// Default timestep \[s\]: at most a third of the stability limit of the default gains.
 pub const DEFAULT_TIMESTEP: f64 = 0.001;
 
 /// The step that a simulation did not take, because state or time would not be finite after it.

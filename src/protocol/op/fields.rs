@@ -8,10 +8,10 @@
 
 use std::borrow::Cow;
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use serde_json::value::RawValue;
 
-use super::rejections::NOT_FINITE;
 pub use super::rejections::{Bound, RejectedField, Rejections};
 pub(crate) use super::rejections::{MISSING, finite, mistyped, too_many, wrong_length};
 
@@ -195,17 +195,12 @@ impl<'a> Fields<'a> {
         Some(texts)
     }
 
-    /// A whole number from 1 to `limit`; `10.0` counts as 10.
-    pub fn count(&mut self, name: &'static str, limit: u64) -> Option<u64> {
+    /// A whole number in `range`; `10.0` counts as 10.
+    pub fn count(&mut self, name: &'static str, range: RangeInclusive<u64>) -> Option<u64> {
         let raw = self.take(name)?;
-        match json::integer(raw) {
-            Some(value) if value > limit => self.mistyped(name, &format!("at most {limit}"), raw),
-            Some(value) if value > 0 => Some(value),
-            _ if json::number(raw).is_some_and(f64::is_infinite) => {
-                self.rejected_as(name, NOT_FINITE)
-            }
-            _ => self.mistyped(name, "an integer, at least 1", raw),
-        }
+        let value = json::integer(raw).filter(|value| range.contains(value));
+        let expected = || format!("an integer from {} to {}", range.start(), range.end());
+        value.or_else(|| self.mistyped(name, &expected(), raw))
     }
 
     /// A whole number, 0 or more; `10.0` counts as 10.

@@ -122,9 +122,6 @@ impl RejectedField {
 /// The reason why a required field is rejected that is not there.
 pub(crate) const MISSING: &str = "is required";
 
-/// The reason why an infinite number is rejected.
-pub(super) const NOT_FINITE: &str = "must be a finite number";
-
 /// The reason why a value of another kind is rejected.
 pub(crate) fn mistyped(expected: &str, raw: &RawValue) -> String {
     format!("must be {expected}, got {}", text::found(raw))
@@ -145,7 +142,7 @@ pub(crate) fn wrong_length(expected: usize, got: usize) -> String {
 pub(crate) fn finite(raw: &RawValue, bound: Bound) -> Result<f64, String> {
     let value = json::number(raw).ok_or_else(|| mistyped("a number", raw))?;
     if !value.is_finite() {
-        return Err(NOT_FINITE.to_owned());
+        return Err(mistyped("a finite number", raw));
     }
     if !bound.holds(value) {
         return Err(mistyped(&bound.to_string(), raw));

@@ -7,9 +7,9 @@ use std::fmt;
 
 use subtle::ConstantTimeEq;
 
-/// Shortest token in bytes: 16 random letters and digits cannot be guessed.
+/// Shortest token in characters: 16 random letters and digits cannot be guessed.
 pub const MIN_TOKEN: usize = 16;
-/// Longest token in bytes: it must fit into the head of an HTTP request.
+/// Longest token in characters, each a byte: it must fit into the head of an HTTP request.
 pub const MAX_TOKEN: usize = 256;
 
 /// A token: printable ASCII without spaces, so it can be in a command line, a URL and a cookie.
@@ -26,14 +26,9 @@ impl Token {
             _ if !text.bytes().all(|byte| byte.is_ascii_graphic()) => {
                 Err("must be printable ASCII without spaces".to_owned())
             }
-            ..MIN_TOKEN => Err(format!(
-                "must be at least {MIN_TOKEN} bytes long, got {}",
-                text.len()
-            )),
             MIN_TOKEN..=MAX_TOKEN => Ok(Self(text.into())),
-            _ => Err(format!(
-                "must be at most {MAX_TOKEN} bytes long, got {}",
-                text.len()
+            length => Err(format!(
+                "must have {MIN_TOKEN} to {MAX_TOKEN} characters, got {length}"
             )),
         }
     }

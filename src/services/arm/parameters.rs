@@ -111,7 +111,7 @@ pub enum NotSet {
     #[error("{NO_SUCH}")]
     Unknown,
     /// It has no value of its own.
-    #[error("name: robot_description is made from lengths and masses")]
+    #[error("name: robot_description cannot be set: it is made from lengths and masses")]
     Derived,
     /// Its value is of another type.
     #[error("{name} must be a {expected} (type {number}), got type {found}")]
@@ -126,7 +126,7 @@ pub enum NotSet {
         found: u8,
     },
     /// The value can't be read.
-    #[error("value must be JSON text")]
+    #[error("value must be JSON, such as 1.5 or \"rk4\" with its quotes")]
     NotJson,
     /// The arm does not take it.
     #[error("{0}")]

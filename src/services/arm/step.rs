@@ -64,7 +64,7 @@ impl<const N: usize> Ask for Step<N> {
 impl<const N: usize> FieldByField for Step<N> {
     fn of(fields: &mut Fields<'_>) -> Self {
         Self {
-            steps: fields.count("steps", MAX_STEPS),
+            steps: fields.count("steps", 1..=MAX_STEPS),
             effort: fields.array("effort", Bound::Finite),
             rejected: fields.rejections(),
         }

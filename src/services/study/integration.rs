@@ -121,7 +121,7 @@ impl Callable for IntegrationStep {
             x0: fields.number("x0", Bound::Finite),
             xdot0: fields.number("xdot0", Bound::Finite),
             dt: fields.number("dt", Bound::Positive),
-            steps: fields.count("steps", MAX_STEPS),
+            steps: fields.count("steps", 1..=MAX_STEPS),
             method: fields.choice("integrator", &Method::ALL, Method::name),
             rejected: fields.finish(),
         })

@@ -85,7 +85,7 @@ impl<const N: usize> Callable for RunOffline<N> {
             params: fields.object("params", SetParams::of),
             gains: fields.object("gains", SetGains::of),
             setpoint: fields.array("setpoint", Bound::Finite),
-            samples: fields.count("samples", MAX_SAMPLES),
+            samples: fields.count("samples", 2..=MAX_SAMPLES),
             reference: fields.boolean("reference"),
         };
         fields.accept(ask)

@@ -56,9 +56,9 @@ fn every_path_that_the_architecture_names_exists() {
 
 /// Names such as `Registry::fan_out` in the drawing of a frame's path.
 #[test]
-fn every_function_on_the_way_of_a_frame_exists() {
+fn every_function_on_the_path_of_a_frame_exists() {
     let paper = text("ARCHITECTURE.md");
-    let (_, drawing) = paper.split_once("## The way of a published frame").unwrap();
+    let (_, drawing) = paper.split_once("## Path of a published frame").unwrap();
     let (_, drawing) = drawing.split_once("```mermaid").unwrap();
     let (drawing, _) = drawing.split_once("```").unwrap();
     let is_part = |one: char| one.is_alphanumeric() || one == '_' || one == ':';

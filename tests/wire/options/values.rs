@@ -67,8 +67,8 @@ const REFUSED: &str = "\
 --log-format=xml | --log-format must be text or json, got \"xml\"
 --token=my secret | --token must be printable ASCII without spaces
 --token=schlüssel | --token must be printable ASCII without spaces
---token=15-bytes-are-it | --token must be at least 16 bytes long, got 15
---token= | --token must be at least 16 bytes long, got 0";
+--token=15-bytes-are-it | --token must have 16 to 256 characters, got 15
+--token= | --token must have 16 to 256 characters, got 0";
 
 /// Options with lists or addresses: arguments, and the beginning of each refusal, which ends with the value.
 const REFUSED_LISTS: &str = "\
@@ -114,7 +114,7 @@ fn other_values_are_refused_by_name_and_value() {
         assert!(refused.ends_with(&format!("got {value:?}")), "{refused}");
     }
     let long = refusal(&[&format!("--token={}", "s".repeat(257))]);
-    assert_eq!(long, "--token must be at most 256 bytes long, got 257");
+    assert_eq!(long, "--token must have 16 to 256 characters, got 257");
 }
 
 #[test]

@@ -68,7 +68,7 @@ fn every_variable_is_taken_and_a_wrong_one_is_refused_by_name_and_value() {
         assert!(refused.ends_with(&format!("got {wrong:?}")), "{refused}");
     }
     let short = refusal(&[], &[("ARM_SIM_TOKEN", "a-Secret")]);
-    assert_eq!(short, "ARM_SIM_TOKEN must be at least 16 bytes long, got 8");
+    assert_eq!(short, "ARM_SIM_TOKEN must have 16 to 256 characters, got 8");
     let reachable = refusal(&[], &[("ARM_SIM_BIND", "0.0.0.0:0")]);
     assert!(
         reachable.starts_with("--bind (ARM_SIM_BIND) must be a loopback address"),

@@ -32,7 +32,7 @@ pub(super) struct Forwarded {
     pub(super) spelling: Option<Box<str>>,
     /// Whether the sender of a goal gets feedback.
     pub(super) wants_feedback: bool,
-    /// Whether a goal was cancelled with all others of its action. Its server is told once.
+    /// Whether a goal was cancelled with all others of its action. Its server is notified once.
     pub(super) is_cancelled: bool,
     /// A caller that has stopped sending is removed when its last call has ended.
     pub(super) _done: Option<Done>,

@@ -55,7 +55,10 @@ impl Callable for RepublishTfs {
         let mut fields = Fields::read(arguments, service)?;
         let target = fields.text("target_frame");
         if let Some(target) = target.filter(|target| target.trim_start_matches('/') != WORLD) {
-            let why = format!("must be {WORLD}, got {target}: the action supports others");
+            let why = format!(
+                "must be {WORLD}, got {target}: the action {} supports others",
+                Action::TfSubscription.name()
+            );
             fields.refuse("target_frame", &why);
         }
         // The topic has every frame, and its own rate.
