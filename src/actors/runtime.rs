@@ -28,6 +28,7 @@ use crate::actors::panics::contain;
 #[cfg(feature = "record")]
 use crate::actors::recorder::{self, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::long_work::THREADS;
 use crate::actors::resources::priority::lower_priority;
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::start;
@@ -40,8 +41,6 @@ use crate::signals::Signals;
 #[cfg(feature = "web")]
 use crate::web::Site;
 
-/// Most threads for long work of the gateway.
-const LONG_WORK_THREADS: usize = 4;
 /// A time longer than any run of the program.
 const FOR_EVER: Duration = Duration::from_secs(100 * 365 * 24 * 60 * 60);
 /// The reason for waiting calls when the runtime ends.
@@ -85,7 +84,7 @@ pub fn run(options: &Options, force_exit: Box<dyn FnOnce() + Send>) -> Result<()
     let tokio = Builder::new_current_thread()
         .enable_all()
         .on_thread_start(lower_priority)
-        .max_blocking_threads(LONG_WORK_THREADS)
+        .max_blocking_threads(THREADS)
         .thread_keep_alive(FOR_EVER)
         .build()?;
     start_long_work_threads(&tokio)?;
@@ -98,7 +97,7 @@ pub fn run(options: &Options, force_exit: Box<dyn FnOnce() + Send>) -> Result<()
 fn start_long_work_threads(tokio: &Runtime) -> std::io::Result<()> {
     let all_are_busy = Arc::new(Mutex::new(()));
     let _until_all_are_there = all_are_busy.lock();
-    for _ in 0..LONG_WORK_THREADS {
+    for _ in 0..THREADS {
         let wait = Arc::clone(&all_are_busy);
         contain(|| drop(tokio.spawn_blocking(move || drop(wait.lock()))))
             .map_err(|panic| std::io::Error::other(panic.to_string()))?;

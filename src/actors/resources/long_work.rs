@@ -17,6 +17,9 @@ use crate::protocol::limits::MEDIUM;
 
 /// Most active threads for each kind of work.
 pub const PLACES: usize = 2;
+const KINDS: usize = 3;
+/// One thread for each place, so that no kind of work waits for another.
+pub const THREADS: usize = KINDS * PLACES;
 
 /// The kinds of work. Each has its own places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +45,7 @@ impl WorkKind {
 }
 
 thread_local! {
-    static FREE: [Arc<Semaphore>; 3] = std::array::from_fn(|_| Arc::new(Semaphore::new(PLACES)));
+    static FREE: [Arc<Semaphore>; KINDS] = std::array::from_fn(|_| Arc::new(Semaphore::new(PLACES)));
 }
 
 /// A place for one kind of work.
