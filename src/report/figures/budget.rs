@@ -76,7 +76,7 @@ fn figure(section: &mut Section, scenes: &[(&str, &Vec<Vec<Parts>>)]) {
     }
     section.figure(
         "error-budget",
-        "With a held effort the hold dominates the error; rounding is far below the other parts while the loop is stable",
+        "With a held effort the hold dominates the error; rounding is the smallest part while the motion is stable",
         &format!(
             "2 links of 1 m and 1 kg, from rest on the horizontal, 2 s. Free: no effort. PD: {REACH}, the effort held \
              for each step. Truncation: the method's steps in double-double arithmetic against the true motion under \

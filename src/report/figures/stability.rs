@@ -57,7 +57,7 @@ fn map(section: &mut Section) {
     let titles = ["Effort held for the step", "Law in every stage"];
     let both = Sampling::ALL.into_iter().zip(titles);
     let panels = both.map(|(sampling, title)| {
-        let mut plot = Plot::new(title, x.clone(), y.clone());
+        let (mut plot, mut marks) = (Plot::new(title, x.clone(), y.clone()), Vec::new());
         for method in Method::ALL {
             let control = |factor| stiffened(factor).with_method(method);
             let (mut predicted, mut measured) = (Vec::new(), Vec::new());
@@ -89,9 +89,9 @@ fn map(section: &mut Section) {
                 }));
             }
             plot.add(Curve::line(Key::of(method).marked(Marker::None), predicted));
-            plot.add(Curve::dots(Key::of(method), measured));
+            marks.push(Curve::dots(Key::of(method), measured));
         }
-        plot
+        plot.with(marks)
     });
     let panels: Vec<Plot> = panels.collect();
     section.claim(
