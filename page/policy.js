@@ -82,6 +82,8 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   const usual = free ? SHARE * inForce : Math.min(afterReset(answer), SHARE * motion);
   return {
     limit: inForce,
+    // A motion's limit is that of the fastest motion with its energy, so it is no more than safe.
+    name: moving ? "the safe limit" : "the limit",
     where: moving ? `moving at up to ${significant(speed ?? NaN, 3)} rad/s` : place,
     place,
     everyPose: Math.min(motion, everyPoseAtRest),
@@ -173,7 +175,8 @@ export function verdict(/** @type {any} */ state) {
   const offered = !slow && own.advised > 0 && own.advised < timestep ? own.advised : NaN;
   const known = { limit, where, advised: offered, slow };
   const at = slow ? `A control period of ${duration(time)}` : duration(time);
-  const above = excess(at, time, limit, where);
+  const name = slow ? "the limit" : own.name;
+  const above = excess(at, time, `${name} ${duration(limit)}`, limit, where);
   if (state.connection !== "open") return { kind: "offline", pill: "no connection", sentence: "", ...known };
   if (state.diagnostics?.state === "diverged") {
     const sentence = above || (limit > 0 ? `${at} was too long for this motion.` : "");
@@ -181,7 +184,7 @@ export function verdict(/** @type {any} */ state) {
   }
   if (Number.isNaN(limit) || Number.isNaN(timestep)) return { kind: "unknown", pill: "limit unknown", sentence: "", ...known };
   if (time > limit) {
-    return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? "beyond the limit" : "never stable", sentence: above, ...known };
+    return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? `beyond ${name}` : "never stable", sentence: above, ...known };
   }
   if (time > everyPose) {
     const others = everyPose > 0 ? `other poses are stable only up to ${duration(everyPose)}: on the way there the arm may shake` : "in other poses no timestep is stable, because of the gains";
@@ -191,11 +194,11 @@ export function verdict(/** @type {any} */ state) {
   return { kind: "stable", pill: "stable", sentence: `${at} is within the limit ${limitText(limit)}, ${where}.`, ...known };
 }
 
-/** Why a time is too long; empty if it is not. @param {string} at the text of the time @param {number} time @param {number} limit @param {string} where */
-function excess(at, time, limit, where) {
+/** Why a time is too long; empty if it is not. @param {string} at the text of the time @param {number} time @param {string} named the limit in words @param {number} limit @param {string} where */
+function excess(at, time, named, limit, where) {
   if (!(time > limit)) return "";
   return limit > 0
-    ? `${at} is above the limit ${duration(limit)}, ${where}.`
+    ? `${at} is above ${named}, ${where}.`
     : `No timestep is stable, ${where}.`;
 }
 

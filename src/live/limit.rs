@@ -161,7 +161,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
                 over(effective, period_limit)
             ),
             Exceeded::Motion(motion) => format!(
-                "the timestep {}, the predicted limit of {method} for a motion of {} rad/s",
+                "the timestep {}, the predicted limit of {method} for a motion of up to {} rad/s",
                 over(timestep, motion.timestep),
                 Shown(motion.speed)
             ),

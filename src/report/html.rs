@@ -4,7 +4,7 @@
 
 use super::machine::Machine;
 use super::section::{Cell, NUMBER, Section, Table};
-use super::svg::{STYLE, escape};
+use super::svg::{escape, style};
 
 const PAGE_STYLE: &str = include_str!("page.css");
 
@@ -15,7 +15,7 @@ const LAST: &str = "work";
 const ABSTRACT: [&str; 5] = ["error", "budget", "stability", "stiff", "scenarios"];
 
 const METHOD: &str = "Sections run in parallel on all cores; sections that measure times run one after the other. \
-     Times are the minimum of repeats after one untimed run, on one thread. While the \
+     Times are processor times of one thread, the minimum of repeats after one untimed run. While the \
      clock runs nothing is counted, compared or written. Errors come from separate runs of the same steps. References \
      are Taylor series of order 30 in double-double arithmetic. They start from the Lagrangian and share no formula \
      with the arm's own kernel. Their uncertainty is the distance to a second series of other order and tolerance. The \
@@ -45,12 +45,13 @@ pub(crate) fn page(sections: &[Section], machine: &Machine) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
-         <title>pendularm: which method, at which timestep</title>\n<style>{STYLE}{PAGE_STYLE}</style></head>\n<body>\
+         <title>pendularm: which method, at which timestep</title>\n<style>{}{PAGE_STYLE}</style></head>\n<body>\
          <header><h1>Which method, at which timestep, for which error, at what cost</h1>\
          <p>The arm of pendularm under each of its integrators. Version {}.</p></header><nav>{}\
          <a href=\"#verdicts\">Verdicts</a><a href=\"#making\">How this was made</a></nav><main>\
          <section id=\"abstract\"><h2>Abstract</h2><p>{}</p></section>\
          <section><h2>Findings</h2><ul class=\"findings\">{}</ul></section>{body}{}</main></body></html>\n",
+        style(),
         escape(&machine.version),
         sections.iter().map(link).collect::<String>(),
         summary(sections),
@@ -109,15 +110,10 @@ fn making(sections: &[Section], machine: &Machine) -> String {
     };
     let made = |section: &Section| {
         let quick = if section.quick { ", quick" } else { "" };
-        let Section {
-            name,
-            seconds,
-            version,
-            ..
-        } = section;
+        let (name, version) = (&section.name, escape(&section.version));
         format!(
-            "<li>{name}: {seconds:.0} s at {}{quick}</li>",
-            escape(version)
+            "<li>{name}: {:.0} s at {version}{quick}</li>",
+            section.seconds
         )
     };
     format!(

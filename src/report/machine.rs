@@ -37,16 +37,10 @@ impl Machine {
             ("Cores", cores.map(|cores| cores.to_string())),
             ("Load when started", load),
         ];
-        let facts = facts.map(|(name, value)| {
-            (
-                name.to_owned(),
-                value.unwrap_or_else(|| "unknown".to_owned()),
-            )
-        });
-        Self {
-            version: VERSION.to_owned(),
-            facts: facts.to_vec(),
-        }
+        let unknown = || "unknown".to_owned();
+        let facts = facts.map(|(name, value)| (name.to_owned(), value.unwrap_or_else(unknown)));
+        let (version, facts) = (VERSION.to_owned(), facts.to_vec());
+        Self { version, facts }
     }
 }
 

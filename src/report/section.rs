@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::svg::{HEIGHT, Key, Marker, Plot, STYLE, WIDTH, csv, escape, lines};
+use super::svg::{HEIGHT, Key, Marker, Plot, WIDTH, csv, escape, lines, style};
 use crate::math::count::length_in_f64;
 
 /// One part of the report.
@@ -258,8 +258,9 @@ fn sheet(title: &str, legend: &[&Key], panels: &[Plot]) -> String {
     });
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
-         height=\"{height}\"><style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>\
+         height=\"{height}\"><style>{}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>\
          {head}{}</svg>\n",
+        style(),
         placed.collect::<String>()
     )
 }

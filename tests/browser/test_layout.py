@@ -120,7 +120,7 @@ class Laptop(Free, Steady, PageTest):
     view = {"width": 1280, "height": 720}
 
     def test_captions_are_whole_also_while_an_arm_shakes(self):
-        self.page.until("document.querySelector('#legend-drift').textContent.length > 3")
+        self.page.until("document.querySelector('#legend-drift').textContent.length > 3 && document.querySelector('#legend-drift + .unit').checkVisibility()")
         self.assertEqual(self.page.run(CLIPPED), [])
         self.shake()
         self.page.until("document.querySelector('#legend-drift-name').textContent === 'work'")

@@ -9,7 +9,9 @@ use crate::math::integrator::Method;
 use crate::report::experiments::error::{OUTPUTS, REACH, Scene, scenes};
 use crate::report::experiments::task::{LOST, RunOutcome};
 use crate::report::section::Section;
-use crate::report::svg::{Axis, Curve, Key, Plot, Point, Unit, number, scientific, seconds};
+use crate::report::svg::{
+    Axis, Curve, Key, Marker, Plot, Point, Unit, number, scientific, seconds,
+};
 use crate::report::timing::time;
 use crate::study::matrix::largest;
 
@@ -24,6 +26,13 @@ const MOST_SEARCHED: u64 = 1 << 17;
 
 /// The lower end of the axis of errors \[rad\].
 const LEAST_SHOWN: f64 = 1e-17;
+
+/// The scenes in words, for both figures.
+const SETTING: &str = "Links of 1 m and 1 kg move for 2 s under gravity of 9.81 m/s², from rest on the horizontal. The whirl \
+     is without gravity: 2 links start at (0, 0.5), and the first joint turns at 10 rad/s. Reaches are of 2 links to \
+     (0.8, -0.6) with kp 200, 100, ki 0 and kd 30, 12. The error is the largest of all joints and instants. For a reach \
+     it is the distance from the loop with a continuous-time law. One mark per timestep: 2 s in 64 steps, in twice as \
+     many, and so on, the same for all methods. A cross at the top edge is a run that diverged.";
 
 /// A scene with its runs.
 struct Data {
@@ -169,13 +178,10 @@ fn against_time(section: &mut Section, data: &[Data]) {
     section.figure(
         "work-precision-time",
         &title,
-        "Arms have the default masses and lengths, and move for 2 s. Free swings start at rest on the horizontal. The \
-         whirl starts at (0, 0.5), and its first joint turns at 10 rad/s. Reaches go to (0.8, -0.6) with kp 200, 100 \
-         and kd 30, 12. One mark per timestep; each timestep is half of the one before, and all methods take the same \
-         ones. Time is the minimum of repeats. Upper scale: evaluations of the dynamics, at the median time of one in \
-         that scene. A cross at the top edge is a run that diverged. The error of a reach is the distance from the \
-         loop with a continuous-time law. The distance from the loop whose law runs once a period is the truncation \
-         in the figure of the error's parts. Each mark's tooltip has its own evaluations.",
+        &format!(
+            "{SETTING} Time is the processor time of one thread, and the minimum of repeats. Upper scale: evaluations \
+             of the dynamics, at the median time of one in that scene. Each mark's tooltip has its own evaluations."
+        ),
         &plots,
     );
 }
@@ -187,9 +193,12 @@ fn against_timestep(section: &mut Section, data: &[Data]) {
     let mut plots = plots(data, &x, |run| run.outcome.timestep);
     for (plot, data) in plots.iter_mut().zip(data) {
         let ends = [plot.y.min, plot.y.max];
-        let limits = data.scene.limits.iter().map(|&(method, limit)| {
-            let key = Key::line(method.name(), "").dashed();
-            Curve::line(key, ends.map(|y| (limit, y)))
+        let limits = data.scene.limits.iter().flat_map(|&(method, limit)| {
+            // Limits are almost equal, so each mark has its own height.
+            let mark = [(limit, 1e-3 * 0.01_f64.powi(method as i32))];
+            let line = Key::predicted(method).marked(Marker::None);
+            let line = Curve::line(line, ends.map(|y| (limit, y)));
+            [line, Curve::dots(Key::predicted(method), mark)]
         });
         let (corner, key) = (
             x.max / 60.0,
@@ -215,8 +224,10 @@ fn against_timestep(section: &mut Section, data: &[Data]) {
             order(Method::Rk4),
             order(Method::Verlet)
         ),
-        "The runs of the figure before, by timestep: the slope is the order of the method. Dashed upright lines: the \
-         predicted largest stable timestep at the setpoint, one per method.",
+        &format!(
+            "{SETTING} The slope is the order of the method. Dashed upright lines: the predicted largest stable \
+             timestep at the setpoint. Its hollow mark is that of the method."
+        ),
         &plots,
     );
 }

@@ -73,12 +73,11 @@ pub(super) fn make(section: &mut Section) {
     section.figure(
         "nonlinear-map",
         "Beyond small deviations the timestep is limited by speed",
-        "Moves: 2 links under the default gains, from rest. Blue: both joints are within 0.02 rad after 6 s; \
-         orange: they are not. Swings: free, from (0, 0.5) with the first joint spinning. Orange: the energy \
-         above the hanging arm's doubles or halves within 4 s. Line: the smaller of two limits. One is that by \
-         linearisation (moves: the least of all poses; swings: of small swings, where there is one). The other is \
-         timestep_limit_motion of /study/stability. Moves that no timestep brings home in time are orange at the top \
-         of every panel.",
+        "Moves: 2 links under the default gains, from rest on the horizontal; the second joint turns by -0.75 times as \
+         much. Pale: both joints are within 0.02 rad of the setpoint after 6 s; dark: they are not. Swings: free, from \
+         (0, 0.5) with the first joint spinning. Dark: the energy above the hanging arm's doubles or halves within 4 s. \
+         Line: the smaller of two limits. One is that by linearisation (moves: the least of all poses; swings: of small \
+         swings, where there is one). The other is timestep_limit_motion of /study/stability.",
         &panels,
     );
 }

@@ -30,9 +30,9 @@ fn finding(section: &mut Section) {
     let (rk4, verlet) = (of(Method::Rk4), of(Method::Verlet));
     let said = |limit: Option<f64>| seconds(limit.unwrap_or(f64::NAN));
     section.findings.push(format!(
-        "**At (0.4, 0.8) with the default gains, the 2-link arm is stable up to a timestep of {} with RK4 and {} with \
-         Verlet**. The limits are equal because the effort is held for the step. They belong to the controller, so a \
-         real arm has them too. With the law in every stage RK4 would be stable up to {}. That limit belongs to the \
+        "**At (0.4, 0.8) with the default gains and an effort held for the step, the 2-link arm is stable up to a \
+         timestep of {} with RK4 and {} with Verlet**. The limits are equal because of the hold. They belong to the \
+         controller, so a real arm has them too. With the law in every stage RK4 would be stable up to {}. That limit belongs to the \
          simulation. The smallest limit of all poses with held effort is {}.",
         said(rk4.held),
         said(verlet.held),
@@ -53,46 +53,47 @@ fn map(section: &mut Section) {
     let factors = centres(&edges(FACTORS, columns * 3 / 4));
     let x = Axis::log("timestep", Unit::Seconds, TIMESTEPS);
     let y = Axis::log("stiffness, times the default gains", Unit::Number, FACTORS);
-    let held = Key::line("soft", "predicted, effort held for the step");
-    let continuous = Key::line("soft", "predicted, law in every stage").dashed();
-    let mut plot = Plot::new("All methods", x, y).with([held, continuous].map(Curve::named));
     let (mut cells, mut disagreeing, mut undecided) = (0, 0, 0);
-    let all = Sampling::ALL.map(|sampling| Method::ALL.map(|method| (method, sampling)));
-    for (method, sampling) in all.into_iter().flatten() {
-        let is_held = sampling == Sampling::Held;
-        let name = if is_held { "held" } else { "continuous" };
-        let control = |factor| stiffened(factor).with_method(method);
-        let (mut predicted, mut measured) = (Vec::new(), Vec::new());
-        for factor in &factors {
-            let growth = |h: &f64| growth(&control(*factor).with_timestep(*h), sampling);
-            let growth: Vec<Option<f64>> = timesteps.iter().map(growth).collect();
-            let linear = Linear::at_setpoint(&control(*factor));
-            let limit = largest_timestep(&linear, method, sampling).unwrap_or(f64::INFINITY);
-            predicted.push((limit, *factor));
-            for (h, growth) in timesteps.iter().zip(&growth) {
-                // The run is too short to judge a cell whose slowest mode changes its energy by less than a factor e.
-                // This decision uses no measurement.
-                let radius = step_matrix(&linear, method, sampling, *h).spectral_radius();
-                if 2.0 * in_f64(STEPS) * radius.ln().abs() < 1.0 {
-                    undecided += 1;
-                } else {
-                    cells += 1;
-                    disagreeing += usize::from(decays(*growth) != (*h < limit));
+    let titles = ["Effort held for the step", "Law in every stage"];
+    let both = Sampling::ALL.into_iter().zip(titles);
+    let panels = both.map(|(sampling, title)| {
+        let (mut plot, mut marks) = (Plot::new(title, x.clone(), y.clone()), Vec::new());
+        for method in Method::ALL {
+            let control = |factor| stiffened(factor).with_method(method);
+            let (mut predicted, mut measured) = (Vec::new(), Vec::new());
+            for (row, factor) in factors.iter().enumerate() {
+                let growth = |h: &f64| growth(&control(*factor).with_timestep(*h), sampling);
+                let growth: Vec<Option<f64>> = timesteps.iter().map(growth).collect();
+                let linear = Linear::at_setpoint(&control(*factor));
+                let limit = largest_timestep(&linear, method, sampling).unwrap_or(f64::INFINITY);
+                predicted.push((limit, *factor));
+                for (h, growth) in timesteps.iter().zip(&growth) {
+                    // The run is too short to judge a cell whose slowest mode changes its energy by less than a factor
+                    // e. This decision uses no measurement.
+                    let radius = step_matrix(&linear, method, sampling, *h).spectral_radius();
+                    if 2.0 * in_f64(STEPS) * radius.ln().abs() < 1.0 {
+                        undecided += 1;
+                    } else {
+                        cells += 1;
+                        disagreeing += usize::from(decays(*growth) != (*h < limit));
+                    }
                 }
+                // The edge below the first cell in which a deviation grew. Each method is marked in rows of its own, so
+                // that lines and marks stay visible.
+                let first = growth.iter().position(|growth| !decays(*growth));
+                let edge =
+                    first.filter(|first| *first > 0 && limit > 0.0 && row % 4 == method as usize);
+                measured.extend(edge.and_then(|first| timestep_edges.get(first)).map(|h| {
+                    let note = format!("predicted {}", seconds(limit));
+                    Point::new(*h, *factor, note)
+                }));
             }
-            // The edge below the first cell in which a deviation grew.
-            let first = growth.iter().position(|growth| !decays(*growth));
-            let edge = first.filter(|first| *first > 0 && limit > 0.0);
-            measured.extend(edge.and_then(|first| timestep_edges.get(first)).map(|h| {
-                let note = format!("{name}, predicted {}", seconds(limit));
-                Point::new(*h, *factor, note)
-            }));
+            plot.add(Curve::line(Key::of(method).marked(Marker::None), predicted));
+            marks.push(Curve::dots(Key::of(method), measured));
         }
-        let key = Key::of(method).marked(Marker::None);
-        let key = if is_held { key } else { key.dashed() };
-        plot.add(Curve::line(key, predicted));
-        plot.add(Curve::dots(Key::of(method), measured));
-    }
+        plot.with(marks)
+    });
+    let panels: Vec<Plot> = panels.collect();
     section.claim(
         "At most 1 % of the map's cells that can be judged disagree with the prediction",
         format!("{disagreeing} of {cells}; {undecided} more, agreeing or not, change too slowly to judge"),
@@ -105,13 +106,13 @@ fn map(section: &mut Section) {
             "Predicted and measured stability agree in {agreeing} of {cells} cells; {undecided} change too slowly to \
              judge"
         ),
-        "2 links at their setpoint, default gains stiffened by a factor (kp by it, kd by its root, ki by its power of \
-         3/2: the same motion, faster). Solid lines: the predicted limit with the effort held for the step, as in the \
-         live arm. Dashed lines: with the law in every stage. Marks: the smallest timestep at which a small deviation \
-         of the arm itself grew. In the lowest rows the gains are too low to hold the arm against gravity, and no \
+        "2 links at their setpoint (0.4, 0.8), default gains stiffened by a factor (kp by it, kd by its root, ki by its \
+         power of 3/2: the same motion, faster). The live arm holds the effort. Lines: the predicted limit. Marks: the smallest timestep at which a \
+         small deviation of the arm itself grew, for each method in one of four rows of cells. Methods whose limits \
+         are equal have one line. In the lowest rows the gains are too low to hold the arm against gravity, and no \
          timestep is stable. A cell counts as too slow to judge if by the prediction its slowest mode changes its \
          energy by less than a factor e in the 4000 simulated steps.",
-        &[plot],
+        &panels,
     );
 }
 
@@ -207,7 +208,7 @@ fn control_period(section: &mut Section) {
             "1, 10 and 100 steps per control period give the same growth to {apart} % from order 2 on; {dots} \
              measurements lie on their curves to {furthest_percent} %"
         ),
-        "2 links, default gains, effort held over the period. Curves: spectral radius of one control period of the \
+        "2 links at (0.4, 0.8), default gains, effort held over the period. Curves: spectral radius of one control period of the \
          linearised loop. Dots: the growth of a small deviation of the arm itself per period, over 4000 periods. The \
          largest stable control period is where a curve crosses 1: shorter steps do not increase it. With \
          Euler the growth depends on the steps per period.",

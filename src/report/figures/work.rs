@@ -150,7 +150,10 @@ impl Measured {
             "left-out",
             "Work of a step and of the server, scene by scene",
             &format!(
-                "Instructions by callgrind, counted with {}. {allocations}",
+                "Instructions by callgrind, counted with {}. step: links, method, law. The law is free (none), weightless \
+                 (none, no gravity), one with the named gains, or pushed (pid with a disturbance of zeros). particle: \
+                 the 1-DOF service under a constant force or a cosine. The server: 2 links, RK4 at 1 ms, controller off, \
+                 4 s of real time; subscribers of /joint_states over TCP. {allocations}",
                 self.with
             ),
             &[

@@ -31,14 +31,13 @@ impl Axis {
         let (min, max) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), log| {
             (min.min(log.floor()), max.max(log.ceil()))
         });
-        if min > max {
-            return Self::log(label, unit, (1.0, 10.0));
-        }
-        Self::log(
-            label,
-            unit,
-            (10_f64.powf(min), 10_f64.powf(max.max(min + 1.0))),
-        )
+        // Without values there is a decade.
+        let (min, max) = if min > max {
+            (0.0, 1.0)
+        } else {
+            (min, max.max(min + 1.0))
+        };
+        Self::log(label, unit, (10_f64.powf(min), 10_f64.powf(max)))
     }
 
     /// A logarithmic axis between these ends.
@@ -55,11 +54,8 @@ impl Axis {
     /// A linear axis between these ends.
     pub fn linear(label: &'static str, (min, max): (f64, f64)) -> Self {
         Self {
-            label,
             is_log: false,
-            unit: Unit::Number,
-            min,
-            max,
+            ..Self::log(label, Unit::Number, (min, max))
         }
     }
 

@@ -1,8 +1,8 @@
 //! Small SVG plots: axes, lines and markers. Without library, script or fixed colours.
 //!
-//! Colours are CSS classes (`STYLE`): one per method in all figures, each with a marker shape, for light and dark
-//! mode. The palette suits colour-blind readers. A plot is drawn for a column of some 400 px; figures are grids of such
-//! panels.
+//! Colours are CSS classes ([`style`]): one per method in all figures, each with a marker shape, for light and dark
+//! mode. The palette suits colour-blind readers. Curves differ in print too: methods by their markers, joints by their
+//! dashes. A plot is drawn for a column of some 400 px; figures are grids of such panels.
 //!
 //! **Invariant:** a value outside the axes is drawn at the edge as lost, never dropped silently.
 
@@ -18,8 +18,14 @@ pub use plot::{Plot, csv};
 use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
 
-/// Classes that plots use, for the page and for files of their own.
-pub(crate) const STYLE: &str = include_str!("style.css");
+/// The style of the page and of files of their own: the classes that plots use, after the colours of methods and joints,
+/// which are those of the program's page.
+pub(crate) fn style() -> String {
+    let lines = include_str!("../../../page/style.css").lines();
+    let is_shared = |it: &&str| it.starts_with("  --joint") || it.starts_with("  --method");
+    let colours: String = lines.filter(is_shared).collect();
+    format!(":root{{{colours}}}{}", include_str!("style.css"))
+}
 
 /// Size of one panel, in pixels.
 pub(crate) const WIDTH: f64 = 420.0;
@@ -28,28 +34,28 @@ pub(crate) const HEIGHT: f64 = 336.0;
 /// Marker shapes: lines differ in shape as well as in colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Marker {
-    None,
     Circle,
     Square,
     Triangle,
     Diamond,
+    Down,
+    Plus,
+    None,
 }
 
 impl Marker {
     /// The shape about `(x, y)` as a path.
     pub(crate) fn path(self, x: f64, y: f64) -> String {
-        match self {
-            Self::None => String::new(),
-            Self::Circle => {
-                format!(
-                    "M{:.1} {y:.1}a3.6 3.6 0 1 0 7.2 0a3.6 3.6 0 1 0 -7.2 0z",
-                    x - 3.6
-                )
-            }
-            Self::Square => format!("M{:.1} {:.1}h6.4v6.4h-6.4z", x - 3.2, y - 3.2),
-            Self::Triangle => format!("M{x:.1} {:.1}l4.2 7.4h-8.4z", y - 4.6),
-            Self::Diamond => format!("M{x:.1} {:.1}l4.6 4.6l-4.6 4.6l-4.6 -4.6z", y - 4.6),
-        }
+        let (left, up, shape) = match self {
+            Self::Circle => (3.6, 0.0, "a3.6 3.6 0 1 0 7.2 0a3.6 3.6 0 1 0 -7.2 0z"),
+            Self::Square => (3.2, 3.2, "h6.4v6.4h-6.4z"),
+            Self::Triangle => (0.0, 4.6, "l4.2 7.4h-8.4z"),
+            Self::Diamond => (0.0, 4.6, "l4.6 4.6l-4.6 4.6l-4.6 -4.6z"),
+            Self::Down => (4.2, 2.8, "h8.4l-4.2 7.4z"),
+            Self::Plus => (1.5, 4.5, "h3v3h3v3h-3v3h-3v-3h-3v-3h3z"),
+            Self::None => return String::new(),
+        };
+        format!("M{:.1} {:.1}{shape}", x - left, y - up)
     }
 }
 
@@ -68,9 +74,16 @@ impl Key {
     /// A method's colour and marker.
     pub(crate) fn of(method: Method) -> Self {
         use Marker::{Circle, Diamond, Square, Triangle};
-        let mut markers = [Circle, Square, Triangle, Diamond].into_iter().cycle();
-        let marker = markers.nth(method as usize).unwrap_or(Circle);
+        let markers = [Circle, Square, Triangle, Diamond];
+        let marker = markers.get(method as usize).copied().unwrap_or(Circle);
         Self::line(method.name(), method.name()).marked(marker)
+    }
+
+    /// A method's prediction: dashed, with hollow marks, and not in the legend.
+    pub(crate) fn predicted(method: Method) -> Self {
+        let mut key = Self::of(method).dashed();
+        key.label.clear();
+        key
     }
 
     /// A line without markers.
@@ -153,11 +166,6 @@ impl Curve {
             has_tooltips: true,
             points,
         }
-    }
-
-    /// An entry of the legend alone.
-    pub(crate) fn named(key: Key) -> Self {
-        Self::line(key, Vec::<Point>::new())
     }
 
     /// Marks alone.

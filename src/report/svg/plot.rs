@@ -226,7 +226,13 @@ impl Plot {
             }
             out += &format!("<path class=\"line\" d=\"{path}\"/>");
         }
-        let points = curve.points.iter().filter(|point| self.x.holds(point.x));
+        // Many marks would hide their line. Some are drawn, for other shapes other ones.
+        let is_long = curve.has_line && curve.points.len() > 30;
+        let every = if is_long { curve.points.len() / 8 } else { 1 };
+        let first = every * marker as usize / Marker::None as usize % every;
+        let points = curve.points.iter().enumerate();
+        let points = points.filter(|(at, it)| at % every == first || !it.y.is_finite());
+        let points = points.map(|(_, it)| it).filter(|it| self.x.holds(it.x));
         if curve.has_tooltips {
             let name = self.name(curve);
             out.extend(points.map(|point| self.point(&name, marker, point)));

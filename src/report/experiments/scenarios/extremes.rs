@@ -87,10 +87,8 @@ fn tiny_steps() -> Observation {
     let end = made.times.last().copied().unwrap_or(f64::NAN);
     let late = (end - 1e7 * 1e-6).abs();
     let steps = made.steps;
-    (
-        error < 1e-13 && late == 0.0,
-        format!("error {error:.1e} rad, time off by {late:e} s after {steps} steps"),
-    )
+    let words = format!("error {error:.1e} rad, time off by {late:e} s after {steps} steps");
+    (error < 1e-13 && late == 0.0, words)
 }
 
 fn huge_steps() -> Observation {
@@ -101,9 +99,8 @@ fn huge_steps() -> Observation {
             .into_iter()
             .flat_map(|it| [(it, 0.1), (it, 1.0)])
         {
-            let control = held(gains, hanging)
-                .with_method(method)
-                .with_timestep(timestep);
+            let control = held(gains, hanging).with_method(method);
+            let control = control.with_timestep(timestep);
             let limit = largest_timestep(&Linear::at_setpoint(&control), method, Sampling::Held);
             let is_predicted = limit.is_some_and(|limit| timestep > limit);
             let mut simulation = control.simulation(State::at_rest([hanging[0] + 0.01, 0.0]));
@@ -142,10 +139,8 @@ fn wound() -> Observation {
     // Both moved by as much; the wound one to the spacing of its doubles.
     other.position[0] = other.position[0] - angle + unwound;
     let after = apart(&one, &other);
-    (
-        at_once < 1e-13 && after < 1.5e-7,
-        format!("accelerations apart by {at_once:.1e}, after 1 s states by {after:.1e}"),
-    )
+    let words = format!("accelerations apart by {at_once:.1e}, after 1 s states by {after:.1e}");
+    (at_once < 1e-13 && after < 1.5e-7, words)
 }
 
 fn huge_setpoints() -> Observation {
@@ -174,10 +169,8 @@ fn subnormal_start() -> Observation {
     // 1e-310 is 2e13 times the smallest double; a few hundred roundings of half of that.
     let off = (0..2).map(|i| (tiny.position[i] - 1e-10 * small.position[i]).abs() / 1e-310);
     let worst = largest(off);
-    (
-        tiny.is_finite() && worst < 1e-10,
-        format!("apart by {worst:.1e} of the start"),
-    )
+    let words = format!("apart by {worst:.1e} of the start");
+    (tiny.is_finite() && worst < 1e-10, words)
 }
 
 fn subnormal_inertia() -> Observation {
@@ -190,10 +183,8 @@ fn subnormal_inertia() -> Observation {
         || "goes on".to_owned(),
         |divergence| format!("refuses step {}", divergence.step),
     );
-    (
-        simulation.state().is_finite(),
-        format!("takes {taken} steps and {end}"),
-    )
+    let words = format!("takes {taken} steps and {end}");
+    (simulation.state().is_finite(), words)
 }
 
 /// Whether an arm is refused with words that begin like this.
@@ -220,10 +211,8 @@ fn refused() -> Observation {
     let named = all.iter().filter(|one| one.0).count();
     let count = all.len();
     let first = all.first().map_or("", |one| one.1.as_str());
-    (
-        named == count,
-        format!("{named} of {count} by name, such as: {first}"),
-    )
+    let words = format!("{named} of {count} by name, such as: {first}");
+    (named == count, words)
 }
 
 // ---- S36 to S39: the methods themselves ----------------------------------------------------------------------------
@@ -278,10 +267,8 @@ fn one_joint() -> Observation {
             }
         }
     }
-    (
-        off < 2e-15 && mismatches == 0 && close < 10,
-        format!("steps apart by {off:.1e}; {mismatches} of 80 000 verdicts differ"),
-    )
+    let words = format!("steps apart by {off:.1e}; {mismatches} of 80 000 verdicts differ");
+    (off < 2e-15 && mismatches == 0 && close < 10, words)
 }
 
 fn swinging() -> State<3> {
@@ -321,10 +308,8 @@ fn changes() -> Observation {
     };
     let slope = (error(500) / error(1000)).log2();
     let bits = if kept { "kept" } else { "lost" };
-    (
-        kept && (slope - 2.0).abs() < 0.2,
-        format!("bits {bits}; slope of the mixed swing {slope:.2}"),
-    )
+    let words = format!("bits {bits}; slope of the mixed swing {slope:.2}");
+    (kept && (slope - 2.0).abs() < 0.2, words)
 }
 
 fn there_and_back() -> Observation {
@@ -347,10 +332,8 @@ fn there_and_back() -> Observation {
         // Errors there and back cancel in part: the order at least, up to one more.
         let order = f64::from(method.order());
         let holds = slope > order - 0.3 && slope < order + 1.3 && fine > 1e-13;
-        (
-            holds,
-            format!("{method} misses by {fine:.1e} at 2 ms (slope {slope:.1})"),
-        )
+        let words = format!("{method} misses by {fine:.1e} at 2 ms (slope {slope:.1})");
+        (holds, words)
     }))
 }
 
@@ -382,9 +365,7 @@ fn step_doubling() -> Observation {
             ratios[ratios.len() - 1],
         );
         let holds = (0.98..=1.03).contains(&median);
-        (
-            holds,
-            format!("{method} {median:.4} ({least:.3} to {most:.3})"),
-        )
+        let words = format!("{method} {median:.4} ({least:.3} to {most:.3})");
+        (holds, words)
     }))
 }

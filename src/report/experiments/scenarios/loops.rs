@@ -252,7 +252,6 @@ fn undamped() -> Observation {
         // Where the region of stability ends on the imaginary axis, for Runge-Kutta methods by their order.
         let expected = match (method, method.order()) {
             (Method::Verlet, _) => 2.0,
-            (_, 3) => 3.0_f64.sqrt(),
             (_, 4) => 8.0_f64.sqrt(),
             _ => 0.0,
         };
@@ -265,10 +264,8 @@ fn undamped() -> Observation {
         let is_predicted = continuous.is_some_and(|it| (it * fastest - expected).abs() < 1e-4);
         let is_measured = expected == 0.0 || (escapes(1.02) && !escapes(0.98));
         let holds = held == Some(0.0) && is_predicted && is_measured;
-        (
-            holds,
-            format!("{method} {} s in every stage, held none", short(continuous)),
-        )
+        let words = format!("{method} {} s in every stage, held none", short(continuous));
+        (holds, words)
     });
     each(limits)
 }
@@ -288,10 +285,8 @@ fn slow_control() -> Observation {
     });
     let worst = furthest_off(&measured);
     let range = format!("{lowest:.5} to {highest:.5} s over methods and substeps");
-    (
-        worst < 0.01 && highest / lowest < 1.01,
-        format!("{range}; measured within {:.4} %", 100.0 * worst),
-    )
+    let words = format!("{range}; measured within {:.4} %", 100.0 * worst);
+    (worst < 0.01 && highest / lowest < 1.01, words)
 }
 
 fn held_push() -> Observation {
@@ -306,16 +301,13 @@ fn held_push() -> Observation {
         growth(&control, Sampling::Held).is_none_or(|growth| growth > 1.0)
     };
     let (slow, fast) = (grows(0.02, 100), grows(2e-4, 1));
-    let words = |grows| if grows { "grows" } else { "decays" };
-    (
-        slow && !fast && limit.is_some_and(|limit| limit < 0.02),
-        format!(
-            "limit of the period {} s; at 20 ms it {}, at 0.2 ms it {}",
-            short(limit),
-            words(slow),
-            words(fast)
-        ),
-    )
+    let [at_slow, at_fast] = [slow, fast].map(|grows| if grows { "grows" } else { "decays" });
+    let words = format!(
+        "limit of the period {} s; at 20 ms it {at_slow}, at 0.2 ms it {at_fast}",
+        short(limit)
+    );
+    let is_short = limit.is_some_and(|limit| limit < 0.02);
+    (slow && !fast && is_short, words)
 }
 
 fn late_control() -> Observation {
@@ -441,10 +433,8 @@ fn heavy_link_stretched() -> Observation {
     let linear = Linear::at_pose(&ControlLoop::free(arm), &[-FRAC_PI_2, 0.0, 0.0]);
     let limits = [(Method::Rk4, 1.649e-5), (Method::Verlet, 1.166e-5)].map(|(method, expected)| {
         let limit = largest_timestep(&linear, method, Sampling::Continuous);
-        (
-            is_near(limit, expected, 0.01),
-            format!("{method} limit {} s", short(limit)),
-        )
+        let words = format!("{method} limit {} s", short(limit));
+        (is_near(limit, expected, 0.01), words)
     });
     let swings = [(1.6e-5, false), (2.0e-5, true)].map(|(timestep, is_apart)| {
         let start = State::at_rest([-FRAC_PI_2, 1e-6, -1e-6]);
@@ -516,9 +506,7 @@ fn whirl<const N: usize>([verlet, rk4]: [f64; 2]) -> [Observation; 2] {
         });
         let both = [Some(predicted), measured];
         let holds = both.iter().all(|limit| is_near(*limit, expected, 0.01));
-        (
-            holds,
-            format!("{method} {predicted:.4e} (measured {})", short(measured)),
-        )
+        let words = format!("{method} {predicted:.4e} (measured {})", short(measured));
+        (holds, words)
     })
 }
