@@ -319,12 +319,13 @@ impl Iterator for FrameReader {
     }
 }
 
-/// Appends received bytes. Without a permit, the buffer stays within [`MEDIUM`]: by itself a `Vec` would grow to twice
-/// as much before those bytes arrive.
+/// Appends received bytes. The buffer grows to twice its size, as a `Vec` does, but without a permit it stays within
+/// [`MEDIUM`].
 pub(super) fn append(buffer: &mut Vec<u8>, bytes: &[u8]) {
     let needed = buffer.len() + bytes.len();
-    if needed > buffer.capacity() && needed <= MEDIUM && needed > MEDIUM / 2 {
-        buffer.reserve_exact(MEDIUM - buffer.len());
+    if needed > buffer.capacity() && needed <= MEDIUM {
+        let capacity = (2 * buffer.capacity()).clamp(needed, MEDIUM);
+        buffer.reserve_exact(capacity - buffer.len());
     }
     buffer.extend_from_slice(bytes);
 }

@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use pendularm::protocol::limits::SHORT;
-use pendularm::protocol::outbox::{MAX_TOPIC_BYTES, MESSAGE_BYTES, Outbox};
+use pendularm::protocol::outbox::{MAX_TOPIC_BYTES, MESSAGE_BYTES, Outbox, Throttle};
 
-use super::throttle;
+use super::{Bench, throttle};
 
 /// A frame that publishes `msg` on `topic`.
 fn line(topic: &str, msg: &str) -> String {
@@ -65,6 +65,28 @@ fn a_series_is_taken_as_one_frame_where_several_are_asked_for() {
     assert_eq!(take(&mut outbox, 2), [SERIES]);
     let mut outbox = with(&[SERIES]);
     assert_eq!(take(&mut outbox, 1), [&SERIES[..SERIES.len() / 2]]);
+    // A queue length takes it apart, and no part keeps the others in memory.
+    let mut outbox = Outbox::new();
+    let queue_length = Some(9);
+    let throttle = Throttle {
+        queue_length,
+        ..Throttle::NONE
+    };
+    outbox.configure(&topic(), Some(throttle));
+    outbox.push(&topic(), Bytes::from(SERIES.to_owned()), Instant::now());
+    let parts = take(&mut outbox, 3);
+    drop(outbox);
+    assert!(parts.len() == 2 && parts.iter().all(Bytes::is_unique));
+}
+
+#[test]
+fn of_an_old_series_the_newest_message_is_left() {
+    let numbered = |n: usize| line("/a", &format!("{{\"n\":{n}}}"));
+    let mut bench = Bench::new();
+    bench.push("/a", (1..4).map(numbered).collect::<String>());
+    bench.advance(1001);
+    assert_eq!(bench.take_all(), [numbered(3)]);
+    assert_eq!(bench.outbox.dropped(), 2);
 }
 
 /// The same number is dropped and counted as with single messages.
@@ -112,6 +134,8 @@ fn a_throttled_topic_keeps_as_many_of_a_series_as_its_queue_is_long() {
             outbox.take_frames(later, 1, usize::MAX);
         }
         let batch: Vec<Bytes> = outbox.writing().cloned().collect();
+        drop(outbox);
+        assert!(batch.iter().all(Bytes::is_unique), "parts of a series");
         let first = 20 - length.min(19);
         let wanted: Vec<String> = [0].into_iter().chain(first..20).map(numbered).collect();
         assert_eq!(batch, wanted, "{length}");
