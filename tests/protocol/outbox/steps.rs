@@ -59,8 +59,8 @@ const ROWS: [(&str, &str); 16] = [
         "a1 b1 +1001 c1 %3 a2 x1 %3 =6:b1,c1,a2",
     ),
     (
-        "after an old message, half a second is too old until the queue is empty",
-        "a1 a2 +1001 a3 a4 x2 -a3 a5 +501 =a5 x3 a6 a7 +501 =a6,a7",
+        "after an old message is dropped, half a second is too old until the queue is empty",
+        "a1 a2 +1001 a3 a4 x2 -a3 a5 +501 =a5 x3 a6 a7 +501 =a6,a7 b1 +1001 a8 a9 +501 =b1,a8,a9 x3",
     ),
     (
         "the age of a message counts from its release by the throttle",
