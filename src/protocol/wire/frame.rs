@@ -493,8 +493,8 @@ fn one_object(text: &[u8]) -> Result<bool, FrameError> {
         match event {
             Some(Event::Balanced) if rest.is_empty() => return Ok(nesting.has_literals),
             Some(Event::Balanced) => return Err(FrameError::MoreBehind),
-            // A newline between tokens is white space.
-            Some(Event::Fault(FrameError::LineEnded)) if !rest.is_empty() => {
+            // The newline, which is unscanned, is white space between tokens.
+            Some(Event::Fault(FrameError::LineEnded)) => {
                 rest = rest.get(1..).unwrap_or_default();
             }
             Some(Event::Fault(error)) => return Err(error),
