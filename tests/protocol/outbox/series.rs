@@ -31,6 +31,7 @@ fn fill(outbox: &mut Outbox, left: usize, now: Instant) {
 fn a_series_is_taken_as_one_frame_where_several_are_asked_for() {
     let series = line("/a", "{}").repeat(2);
     let one = &series[..series.len() / 2];
+    let next = Bytes::from_static(b"next");
     // A queue length takes it apart. Another topic's throttle does not.
     let queue_length = Some(9);
     let throttle = Throttle {
@@ -45,12 +46,14 @@ fn a_series_is_taken_as_one_frame_where_several_are_asked_for() {
         let mut bench = Bench::new();
         bench.outbox.configure(&throttled.into(), Some(throttle));
         bench.push("/a", series.clone());
-        bench.push("/a", "next");
+        bench.push("/a", next.clone());
         let taken = bench.take(most, usize::MAX);
         assert_eq!(taken, parts);
         drop(bench);
         let is_alone = throttled == "/b" || taken[..2].iter().all(Bytes::is_unique);
         assert!(is_alone, "a part keeps the others in memory");
+        let is_shared = most == 1 || taken.last().unwrap().as_ptr() == next.as_ptr();
+        assert!(is_shared, "a single message is copied");
     }
 }
 
