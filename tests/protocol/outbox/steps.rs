@@ -13,7 +13,7 @@ use bytes::Bytes;
 use super::Bench;
 use pendularm::protocol::outbox::{MAX_MESSAGE, Throttle};
 
-const ROWS: [(&str, &str); 16] = [
+const ROWS: [(&str, &str); 17] = [
     (
         "the newest messages are held, and one leaves per interval",
         "~a100/2 a1 a2 a3 a4 #6 =a1 #4 ?100 +99 = ?1 +1 =a3 ?100 +100 =a4 ? #0 x0",
@@ -69,6 +69,10 @@ const ROWS: [(&str, &str); 16] = [
     (
         "a queue length bounds the queue of a slow client, which has been offered a message",
         "qa2 a1 a2 a3 -a1 a4 b4 a5 b5 x2 w2 =a4,b4,a5,b5",
+    ),
+    (
+        "a queue length counts no other topic's old message",
+        "c1 b1 +1001 qa1 a1 a2 a3 -c1 a4 x3 =b1,a4",
     ),
     (
         "a full socket takes only fresh messages ahead of a response",
