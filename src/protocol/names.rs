@@ -70,12 +70,11 @@ pub fn same_type(one: &str, other: &str) -> bool {
     short == long || is_without_middle(short, long)
 }
 
-/// Whether `short` is `long` without its middle part or parts.
+/// Whether `short` is `long`, another name, without its middle part or parts.
 fn is_without_middle(short: &str, long: &str) -> bool {
     let parts = short.split_once('/');
     let middle = parts
         .filter(|(_, last)| !last.contains('/'))
         .and_then(|(package, last)| long.strip_prefix(package)?.strip_suffix(last));
-    middle
-        .is_some_and(|middle| middle.len() > 1 && middle.starts_with('/') && middle.ends_with('/'))
+    middle.is_some_and(|middle| middle.starts_with('/') && middle.ends_with('/'))
 }

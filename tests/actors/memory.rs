@@ -4,15 +4,15 @@
 use std::time::Duration;
 
 use crate::study::settled_arm;
-use crate::system::in_real_time;
-use crate::virtual_time::{Gateway, Peer, WIDE};
+use crate::system::{in_real_time, in_virtual_time};
+use crate::virtual_time::{Gateway, Peer, WIDE, settle};
 use actix::prelude::*;
 use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::limits::{CLIENT_BYTES, MAX_LONG_FORMS, MAX_MEMORY};
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::resources::memory::{LONG_ANSWERS, LONG_FRAMES, Memory, SHORT};
-use serde_json::json;
+use serde_json::{Value, json};
 use tokio::time::sleep;
 
 const MIB: usize = 1024 * 1024;
@@ -34,11 +34,37 @@ async fn computing(answers: usize, workers: &WorkerPool) -> Gateway {
     Gateway::within(Memory::of(1, answers), nodes).await
 }
 
-async fn ask_steps(client: &mut Peer, steps: usize) {
+async fn ask(client: &mut Peer, service: &str, args: Value) {
     client
-        .send(json!({"op": "call_service", "service": STEP, "id": steps,
-            "args": {"function": "sin(t)", "x0": 1.0 / 3.0, "dt": 1e-3, "steps": steps, "integrator": "euler"}}))
+        .send(json!({"op": "call_service", "service": service, "args": args}))
         .await;
+}
+
+fn steps(steps: usize) -> Value {
+    json!({"function": "sin(t)", "x0": 1.0 / 3.0, "dt": 1e-3, "steps": steps, "integrator": "euler"})
+}
+
+#[test]
+fn each_kind_of_computation_reserves_memory_before_it_begins() {
+    in_virtual_time(async {
+        for (service, args) in [
+            (STEP, steps(9_999)),
+            ("/study/rollout", json!({"samples": 2000})),
+            ("/study/stability", json!({})),
+            ("/study/gains", json!({})),
+            ("/study/plan", json!({"error": 1e-9})),
+        ] {
+            let workers = WorkerPool::without_threads();
+            let gateway = computing(LONG_ANSWERS, &workers).await;
+            let mut client = gateway.connect(WIDE);
+            ask(&mut client, service, args).await;
+            settle().await;
+            assert!(workers.turn());
+            // A part is 16 KiB.
+            assert!(gateway.gauges.memory().taken() > 1, "{service}");
+            workers.close("the end");
+        }
+    });
 }
 
 #[test]
@@ -50,15 +76,15 @@ fn computations_that_fit_only_after_one_another_wait_for_one_another() {
         // The first answer fits into no pipe, so it keeps its memory, more than 32 parts of it, until it is read.
         let pipes = [SHORT].into_iter().chain([WIDE; 11]);
         let mut clients: Vec<Peer> = pipes.map(|size| gateway.connect(size)).collect();
-        ask_steps(&mut clients[0], 10_000).await;
+        ask(&mut clients[0], STEP, steps(10_000)).await;
         while gateway.gauges.memory().taken() < 32 {
             sleep(Duration::from_millis(1)).await;
         }
         for client in &mut clients[1..] {
-            ask_steps(client, 10_000).await;
+            ask(client, STEP, steps(10_000)).await;
         }
         let mut light = gateway.connect(WIDE);
-        ask_steps(&mut light, 10).await;
+        ask(&mut light, STEP, steps(10)).await;
         assert_eq!(light.receive().await["result"], true);
         for client in &mut clients {
             let response = client.receive().await;

@@ -13,7 +13,7 @@ use crate::stage::Stage;
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Node, WIDE, settle};
 use pendularm::actors::gateway::registry::Nodes;
-use pendularm::actors::node::Publish;
+use pendularm::actors::node::{Publish, TopicMessage};
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages;
 use serde_json::json;
@@ -62,17 +62,7 @@ fn a_node_is_notified_of_the_first_subscriber_and_of_the_end_of_the_last() {
 #[test]
 fn a_nodes_message_on_a_topic_of_the_runtime_reaches_clients_but_not_the_listener() {
     in_virtual_time(async {
-        let received: Log<String> = Rc::default();
-        let log = Rc::clone(&received);
-        let node = Node {
-            on_message: Box::new(move |message| {
-                log.borrow_mut().push(message.msg.get().to_owned());
-            }),
-            ..Node::default()
-        };
-        let mut nodes = Nodes::default();
-        node.attach(&mut nodes, &[], &[Topic::JointTrajectory]);
-        let gateway = Gateway::with(nodes).await;
+        let (gateway, received) = listening().await;
         let mut client = gateway.connect(WIDE);
         client.subscribe("/joint_trajectory").await;
         let msg = json!({"points": []});
@@ -88,19 +78,24 @@ fn a_nodes_message_on_a_topic_of_the_runtime_reaches_clients_but_not_the_listene
     });
 }
 
+/// A gateway with a node that keeps the trajectories it gets.
+async fn listening() -> (Gateway, Log<TopicMessage>) {
+    let kept: Log<TopicMessage> = Rc::default();
+    let log = Rc::clone(&kept);
+    let node = Node {
+        on_message: Box::new(move |message| log.borrow_mut().push(message)),
+        ..Node::default()
+    };
+    let mut nodes = Nodes::default();
+    node.attach(&mut nodes, &[], &[Topic::JointTrajectory]);
+    (Gateway::with(nodes).await, kept)
+}
+
 /// The sender's next frame waits until the node has handled its message.
 #[test]
 fn a_trajectory_has_taken_effect_before_its_senders_next_frame_is_taken() {
     in_virtual_time(async {
-        let held = Rc::new(RefCell::new(Vec::new()));
-        let log = Rc::clone(&held);
-        let node = Node {
-            on_message: Box::new(move |message| log.borrow_mut().push(message)),
-            ..Node::default()
-        };
-        let mut nodes = Nodes::default();
-        node.attach(&mut nodes, &[], &[Topic::JointTrajectory]);
-        let gateway = Gateway::with(nodes).await;
+        let (gateway, held) = listening().await;
         let (mut client, mut other) = (gateway.connect(WIDE), gateway.connect(WIDE));
         client.publish("/joint_trajectory", 1).await;
         client.publish("/joint_trajectory", 2).await;

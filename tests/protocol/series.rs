@@ -181,7 +181,7 @@ fn byte() -> impl Strategy<Value = u8> {
 /// An object of plain JSON.
 fn json() -> impl Strategy<Value = String> {
     let leaf = prop_oneof![
-        Just("null".to_owned()),
+        prop::sample::select(vec!["null", "0", "-0.5"]).prop_map(str::to_owned),
         Just("true".to_owned()),
         Just("false".to_owned()),
         any::<i64>().prop_map(|number| number.to_string()),

@@ -58,10 +58,7 @@ pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
 /// A forwarded message of a client; `msg` is valid JSON.
 #[must_use]
 pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
-    // The capacity is exact, because outboxes of slow subscribers hold ten thousands of these and count only their
-    // text.
-    let head = "{\"op\":\"publish\",\"topic\":\"\",\"msg\":}\n".len();
-    Encoder::with_room("publish", head + topic.len() + msg.line().len())
+    Encoder::with_room("publish", msg)
         .value("topic", topic)
         .value("msg", msg)
         .end()
@@ -162,7 +159,7 @@ pub fn action_goal(
     args: &Payload,
     feedback: bool,
 ) -> Bytes {
-    Encoder::with_room("send_action_goal", args.line().len() + USUAL_FRAME)
+    Encoder::with_room("send_action_goal", args)
         .value("action", action)
         .value("id", id)
         .optional("action_type", type_name)
@@ -193,7 +190,7 @@ pub fn status(level: Level, msg: &str, id: Option<&Payload>) -> Bytes {
 /// A call for a provider that is a client, under an id of the runtime. `args` are forwarded.
 #[must_use]
 pub fn call(service: &str, id: &str, args: &Payload) -> Bytes {
-    Encoder::with_room("call_service", args.line().len() + USUAL_FRAME)
+    Encoder::with_room("call_service", args)
         .value("service", service)
         .value("id", id)
         .value("args", args)
@@ -211,10 +208,12 @@ struct Encoder {
 
 impl Encoder {
     fn op(op: &str) -> Self {
-        Self::with_room(op, USUAL_FRAME)
+        Self::after(Vec::with_capacity(USUAL_FRAME), op)
     }
 
-    fn with_room(op: &str, bytes: usize) -> Self {
+    /// A frame that also has room for the payload, so it is not copied.
+    fn with_room(op: &str, payload: &Payload) -> Self {
+        let bytes = USUAL_FRAME + payload.line().len();
         Self::after(Vec::with_capacity(bytes), op)
     }
 

@@ -16,6 +16,7 @@
 mod message;
 mod throttle;
 
+use std::cmp::Ordering;
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -153,11 +154,14 @@ impl Outbox {
         let mut bytes = 0;
         let mut taken = 0;
         while taken < max_frames.max(1) {
-            let is_response = match (self.topics.front(), self.responses.front()) {
-                (Some(topic), Some((response, _))) => *response < topic.number,
-                (Some(_), None) => false,
-                (None, Some(_)) => true,
-                (None, None) => break,
+            let topic = self.topics.front().map_or(u64::MAX, |topic| topic.number);
+            let response = self.responses.front();
+            let response = response.map_or(u64::MAX, |(number, _)| *number);
+            let is_response = match response.cmp(&topic) {
+                Ordering::Less => true,
+                Ordering::Greater => false,
+                // Neither waits.
+                Ordering::Equal => break,
             };
             if !is_response && self.room == Some(0) {
                 if !self.has_responses() {

@@ -275,31 +275,20 @@ mod tests {
     fn a_fragment_beyond_a_bound_is_refused_with_its_message() {
         let now = Instant::now();
         let mut fragments = Fragments::default();
-        for (bad, why) in [
-            (
-                piece("a", 1, 3, "y"),
-                FragmentError::Changed { before: 2, now: 3 },
-            ),
-            (
-                piece("a", 2, 2, "y"),
-                FragmentError::NoSuchPiece { num: 2, total: 2 },
-            ),
-            (
-                piece("b", 0, 0, "y"),
-                FragmentError::NoSuchPiece { num: 0, total: 0 },
-            ),
-            (
-                piece("b", 0, MAX_PIECES + 1, "y"),
-                FragmentError::TooMany(MAX_PIECES + 1),
-            ),
-            (
-                piece("a", 1, 2, &"x".repeat(MAX_FRAME)),
-                FragmentError::TooLong,
-            ),
+        let (many, long) = (MAX_PIECES + 1, "x".repeat(MAX_FRAME));
+        let changed = FragmentError::Changed { before: 2, now: 3 };
+        let none = |num, total| FragmentError::NoSuchPiece { num, total };
+        for (bad, why, start) in [
+            (piece("a", 1, 3, "y"), changed, "x"),
+            (piece("a", 2, 2, "y"), none(2, 2), "x"),
+            (piece("b", 0, 0, "y"), none(0, 0), "y"),
+            (piece("b", 2, 2, "y"), none(2, 2), ""),
+            (piece("b", 0, many, "y"), FragmentError::TooMany(many), "y"),
+            (piece("a", 1, 2, &long), FragmentError::TooLong, "x"),
         ] {
             fragments.take(piece("a", 0, 2, "x"), now).unwrap();
-            let refused = fragments.take(bad, now).map_err(|(error, _)| error);
-            assert_eq!(refused, Err(why));
+            let refused = fragments.take(bad, now);
+            assert_eq!(refused, Err((why, start.into())));
             assert_eq!((fragments.allocated(), fragments.began()), (0, None));
         }
         let most = fragments.take(piece("a", 0, MAX_PIECES, "x"), now);

@@ -319,12 +319,13 @@ impl Iterator for FrameReader {
     }
 }
 
-/// Appends received bytes. Without a permit, the buffer stays within [`MEDIUM`]: by itself a `Vec` would grow to twice
-/// as much before those bytes arrive.
+/// Appends received bytes. The buffer grows to twice its size, as a `Vec` does, but without a permit it stays within
+/// [`MEDIUM`].
 pub(super) fn append(buffer: &mut Vec<u8>, bytes: &[u8]) {
     let needed = buffer.len() + bytes.len();
-    if needed > buffer.capacity() && needed <= MEDIUM && needed > MEDIUM / 2 {
-        buffer.reserve_exact(MEDIUM - buffer.len());
+    if needed > buffer.capacity() && needed <= MEDIUM {
+        let capacity = (2 * buffer.capacity()).clamp(needed, MEDIUM);
+        buffer.reserve_exact(capacity - buffer.len());
     }
     buffer.extend_from_slice(bytes);
 }
@@ -492,8 +493,8 @@ fn one_object(text: &[u8]) -> Result<bool, FrameError> {
         match event {
             Some(Event::Balanced) if rest.is_empty() => return Ok(nesting.has_literals),
             Some(Event::Balanced) => return Err(FrameError::MoreBehind),
-            // A newline between tokens is white space.
-            Some(Event::Fault(FrameError::LineEnded)) if !rest.is_empty() => {
+            // The newline, which is unscanned, is white space between tokens.
+            Some(Event::Fault(FrameError::LineEnded)) => {
                 rest = rest.get(1..).unwrap_or_default();
             }
             Some(Event::Fault(error)) => return Err(error),

@@ -168,11 +168,8 @@ fn overflows(token: &[u8]) -> bool {
         return false;
     };
     // The number of digits before the point after applying the exponent; 0 or less if zeros follow the point.
-    let shift = if first < point {
-        whole(point - first)
-    } else {
-        -whole(first - point - 1)
-    };
+    let zeros = mantissa.iter().take(first).filter(|byte| **byte == b'0');
+    let shift = whole(point) - whole(zeros.count());
     match shift
         .saturating_add(power(exponent))
         .cmp(&whole(OVERFLOW.len()))

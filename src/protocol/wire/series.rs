@@ -23,8 +23,6 @@ const MIDDLE: &[u8] = b"\",\"msg\":{";
 const END: &[u8] = b"}\n";
 /// Longest number whose value is certainly finite: the largest `f64` has 309 digits.
 const MAX_DIGITS: usize = 308;
-/// Levels that fit into one word, including the message itself. The general reader handles deeper messages.
-const MAX_LEVELS: u32 = 60;
 
 /// Consecutive messages of a client on a topic of clients.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -129,7 +127,7 @@ fn message(bytes: &[u8], head: &[u8]) -> Option<usize> {
 /// The end of the JSON object whose brace is right before `at`. `None` if it is not valid or not complete, or if it
 /// needs the general reader, for escapes, bytes beyond ASCII, exponents, very long numbers or very deep nesting.
 fn object(bytes: &[u8], mut at: usize) -> Option<usize> {
-    // One bit per open level, 1 for a bracket. The leading 1 marks their number.
+    // One bit per open level, 1 for a bracket. The leading 1 marks their number. The general reader handles more levels.
     let mut levels: u64 = 0b10;
     let mut fresh = true;
     loop {
@@ -148,10 +146,7 @@ fn object(bytes: &[u8], mut at: usize) -> Option<usize> {
                 b'"' => string(bytes, at + 1)?,
                 b'-' | b'0'..=b'9' => number(bytes, at)?,
                 b'{' | b'[' => {
-                    levels = (levels << 1) | u64::from(byte == b'[');
-                    if levels.leading_zeros() < u64::BITS - MAX_LEVELS {
-                        return None;
-                    }
+                    levels = levels.checked_mul(2)? | u64::from(byte == b'[');
                     fresh = true;
                     at += 1;
                     continue;

@@ -93,6 +93,8 @@ mod tests {
             push_plain(&mut text, acting);
             assert_eq!(text, acting.escape_default().to_string());
             assert!(text.is_ascii() && text.starts_with('\\'), "{text}");
+            let text = escape(&format!("-{acting}"));
+            assert_eq!(text, format!("-\\u{:04x}", u32::from(acting)));
         }
         for plain in [
             ' ',

@@ -1,6 +1,6 @@
 //! The limits of a frame's length and nesting, and of the reader's buffer.
 
-use pendularm::protocol::limits::{MAX_FRAME, MAX_NESTING};
+use pendularm::protocol::limits::{MAX_FRAME, MAX_NESTING, MEDIUM};
 use pendularm::protocol::wire::frame::{FrameError, FrameReader};
 
 use super::{frame, nested, outcomes, read};
@@ -71,12 +71,35 @@ fn a_frame_that_is_too_long_is_reported_before_it_ends_and_is_not_kept() {
 #[test]
 fn an_idle_reader_gives_back_the_memory_of_a_long_frame() {
     let mut reader = FrameReader::new();
-    let text = format!("{{\"a\":\"{}\"}}\n", "x".repeat(1_000_000));
-    reader.push(text.as_bytes());
-    assert_eq!(reader.by_ref().count(), 1);
-    assert!(reader.buffered() < 64 * 1024);
-    // The buffer for usual frames stays, so they are read without an allocation.
-    assert!(reader.buffered() >= 16 * 1024);
+    let [long, medium] = [1_000_000, 20_000].map(|size| format!("{{\"{}\"}}", "x".repeat(size)));
+    let behind = medium + &"{}".repeat(30_000);
+    reader.push((long + &behind).as_bytes());
+    // The first frame keeps the buffer. The others are copied out of a new one. Of that, the buffer for usual frames
+    // stays, so they are read without an allocation.
+    for (frames, kept) in [
+        (1, behind.len()),
+        (20_000, behind.len()),
+        (20_000, 16 * 1024),
+    ] {
+        reader.by_ref().take(frames).for_each(drop);
+        assert_eq!(reader.buffered(), kept);
+    }
+}
+
+/// In pieces that double it, and in one that does not.
+#[test]
+fn a_growing_buffer_stays_within_the_bytes_that_need_no_permit() {
+    let mut reader = FrameReader::new();
+    for length in (4096..=MEDIUM).step_by(4096) {
+        reader.push(&[b'{'; 4096]);
+        let expected = length.next_power_of_two().min(MEDIUM);
+        assert_eq!(reader.buffered(), expected);
+    }
+    let mut reader = FrameReader::new();
+    for length in [MEDIUM - 1, 1] {
+        reader.push(&vec![b'{'; length]);
+    }
+    assert_eq!(reader.buffered(), MEDIUM);
 }
 
 /// The end of a frame is never the end of the pushed bytes.

@@ -1,7 +1,6 @@
-//! Bytes and costs of frames until they have been written, and the feedback of goals.
+//! Bytes and costs of frames until they have been written.
 
 use pendularm::protocol::limits::{MEDIUM, SHORT};
-use pendularm::protocol::outbox::MAX_MESSAGE;
 
 use super::Bench;
 
@@ -37,22 +36,13 @@ fn a_long_message_is_there_until_its_last_byte_has_been_written() {
     assert!(bench.outbox.has_long());
     bench.outbox.written(1);
     assert!(!bench.outbox.has_long());
-}
-
-/// A topic may have the action's name.
-#[test]
-fn feedback_is_not_throttled_and_replaces_no_other_message() {
-    let mut bench = Bench::new();
-    bench.throttle("/a", 1000, 1);
-    bench.push("/a", "1");
-    bench.push("/a", "held back");
-    bench.outbox.push_feedback("2".into(), bench.now);
-    bench.outbox.push_feedback("3".into(), bench.now);
-    bench
-        .outbox
-        .push_feedback(vec![b'x'; MAX_MESSAGE + 1].into(), bench.now);
-    assert_eq!(bench.outbox.dropped(), 1);
-    assert_eq!(bench.take_all(), ["1", "2", "3"]);
-    bench.advance(1000);
-    assert_eq!(bench.take_all(), ["held back"]);
+    // It is not held back for longer than 20 s. The first message is not held back.
+    let long = MEDIUM + 1;
+    for (interval, length, count) in [(20_000, long, 2), (20_001, long, 1), (20_001, MEDIUM, 2)] {
+        let mut bench = Bench::new();
+        bench.throttle("/a", interval, 1);
+        bench.push("/a", "first");
+        bench.push("/a", vec![b'x'; length]);
+        assert_eq!(bench.outbox.topic_count(), count);
+    }
 }

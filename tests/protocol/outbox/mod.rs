@@ -2,11 +2,10 @@
 //!
 //! **Invariant:** time is a parameter; no test waits.
 
-mod age;
 mod costs;
 mod properties;
 mod series;
-mod throttles;
+mod steps;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

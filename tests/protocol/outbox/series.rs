@@ -7,30 +7,13 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use pendularm::protocol::limits::SHORT;
-use pendularm::protocol::outbox::{MAX_TOPIC_BYTES, MESSAGE_BYTES, Outbox};
+use pendularm::protocol::outbox::{MAX_TOPIC_BYTES, MESSAGE_BYTES, Outbox, Throttle};
 
-use super::throttle;
+use super::{Bench, throttle};
 
 /// A frame that publishes `msg` on `topic`.
 fn line(topic: &str, msg: &str) -> String {
     format!("{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{msg}}}\n")
-}
-
-fn topic() -> Arc<str> {
-    Arc::from("/a")
-}
-
-/// An outbox with these messages.
-fn with(frames: &[&'static str]) -> Outbox {
-    let mut outbox = Outbox::new();
-    for frame in frames {
-        outbox.push(
-            &topic(),
-            Bytes::from_static(frame.as_bytes()),
-            Instant::now(),
-        );
-    }
-    outbox
 }
 
 /// Adds messages of another topic up to the limit, less this many bytes and one more message.
@@ -44,27 +27,44 @@ fn fill(outbox: &mut Outbox, left: usize, now: Instant) {
     }
 }
 
-fn take(outbox: &mut Outbox, max_frames: usize) -> Vec<Bytes> {
-    outbox.take_frames(Instant::now(), max_frames, usize::MAX);
-    outbox.writing().cloned().collect()
+#[test]
+fn a_series_is_taken_as_one_frame_where_several_are_asked_for() {
+    let series = line("/a", "{}").repeat(2);
+    let one = &series[..series.len() / 2];
+    let next = Bytes::from_static(b"next");
+    // A queue length takes it apart. Another topic's throttle does not.
+    let queue_length = Some(9);
+    let throttle = Throttle {
+        queue_length,
+        ..Throttle::NONE
+    };
+    for (throttled, most, parts) in [
+        ("/b", 2, &[&*series, "next"][..]),
+        ("/b", 1, &[one]),
+        ("/a", 3, &[one, one, "next"]),
+    ] {
+        let mut bench = Bench::new();
+        bench.outbox.configure(&throttled.into(), Some(throttle));
+        bench.push("/a", series.clone());
+        bench.push("/a", next.clone());
+        let taken = bench.take(most, usize::MAX);
+        assert_eq!(taken, parts);
+        drop(bench);
+        let is_alone = throttled == "/b" || taken[..2].iter().all(Bytes::is_unique);
+        assert!(is_alone, "a part keeps the others in memory");
+        let is_shared = most == 1 || taken.last().unwrap().as_ptr() == next.as_ptr();
+        assert!(is_shared, "a single message is copied");
+    }
 }
 
 #[test]
-fn a_series_is_taken_as_one_frame_where_several_are_asked_for() {
-    const SERIES: &str = "{\"op\":\"publish\",\"topic\":\"/a\",\"msg\":{}}\n{\"op\":\"publish\",\"topic\":\"/a\",\"msg\":{}}\n";
-    let mut outbox = with(&[SERIES, "next"]);
-    assert_eq!(take(&mut outbox, 2), [SERIES, "next"]);
-    // Another topic's throttle does not take it apart.
-    let mut outbox = Outbox::new();
-    outbox.configure(&Arc::from("/b"), Some(throttle(Duration::from_secs(1), 1)));
-    outbox.push(
-        &topic(),
-        Bytes::from_static(SERIES.as_bytes()),
-        Instant::now(),
-    );
-    assert_eq!(take(&mut outbox, 2), [SERIES]);
-    let mut outbox = with(&[SERIES]);
-    assert_eq!(take(&mut outbox, 1), [&SERIES[..SERIES.len() / 2]]);
+fn of_an_old_series_the_newest_message_is_left() {
+    let numbered = |n: usize| line("/a", &format!("{{\"n\":{n}}}"));
+    let mut bench = Bench::new();
+    bench.push("/a", (1..4).map(numbered).collect::<String>());
+    bench.advance(1001);
+    assert_eq!(bench.take_all(), [numbered(3)]);
+    assert_eq!(bench.outbox.dropped(), 2);
 }
 
 /// The same number is dropped and counted as with single messages.
@@ -112,6 +112,8 @@ fn a_throttled_topic_keeps_as_many_of_a_series_as_its_queue_is_long() {
             outbox.take_frames(later, 1, usize::MAX);
         }
         let batch: Vec<Bytes> = outbox.writing().cloned().collect();
+        drop(outbox);
+        assert!(batch.iter().all(Bytes::is_unique));
         let first = 20 - length.min(19);
         let wanted: Vec<String> = [0].into_iter().chain(first..20).map(numbered).collect();
         assert_eq!(batch, wanted, "{length}");
