@@ -1,6 +1,6 @@
 //! Small SVG plots: axes, lines and markers. Without library, script or fixed colours.
 //!
-//! Colours are CSS classes ([`style`]): one per method in all figures, each with a marker shape, for light and dark
+//! Colours are CSS classes (`style.css`): one per method in all figures, each with a marker shape, for light and dark
 //! mode. The palette suits colour-blind readers. Curves differ in print too: methods by their markers, joints by their
 //! dashes. A plot is drawn for a column of some 400 px; figures are grids of such panels.
 //!
