@@ -62,7 +62,7 @@ fn the_timestep_and_the_evaluations_are_runs() {
 #[test]
 fn the_parts_of_the_error_are_runs() {
     let parts = Budget::new(true, 2.0).parts(&[Method::Rk4], 2048)[0];
-    agrees(STUDY, "At a timestep and control period of ", parts.timestep, 3);
+    agrees(STUDY, "timestep and control period of ", parts.timestep, 3);
     agrees(STUDY, "kd 30, 12 is off by ", parts.hold, 2);
     agrees(STUDY, "because the effort is held, ", parts.truncation, 2);
     agrees(STUDY, "by RK4's truncation and ", parts.rounding, 2);
