@@ -24,18 +24,18 @@ fn implicit_baselines_have_their_orders_and_do_not_see_stiffness() {
         let seen = (error(512) / error(1024)).log2();
         assert!((seen - order).abs() < 0.2, "{}: {seen}", solver.name());
     }
-    let stiff = StiffScene::new(1e6);
+    let stiff = StiffScene::new(1e5);
     assert!(stiff.task.uncertainty < 1e-6, "{}", stiff.task.uncertainty);
     for solver in [Solver::ImplicitMidpoint, Solver::Rodas3] {
         let run = stiff.task.run(solver, 512, LOST);
         assert!(run.error < 1e-3, "{} {run:?}", solver.name());
     }
-    // The explicit ones have to follow the elbow's rate.
-    for method in Method::ALL {
-        let solver = Solver::Explicit(method);
-        assert!(stiff.fewest_stable_steps(solver).unwrap() > 1e5);
-        let error = stiff.task.run(solver, 4096, LOST).error;
-        assert!(error >= 1e-2, "{method}: {error}");
+    // The explicit ones have to follow the elbow's rate, and nothing faster. Euler's swing grows before.
+    for solver in [Method::Midpoint, Method::Verlet, Method::Rk4].map(Solver::Explicit) {
+        let fewest = stiff.fewest_stable_steps(solver).unwrap() / 8.0;
+        let run = |part| stiff.task.run(solver, 8 * (part * fewest) as u64, LOST);
+        let (few, enough) = (run(0.99).error, run(1.01).error);
+        assert!(few >= 1e-2 && enough < 1e-2, "{few} {enough} {solver:?}");
     }
 }
 

@@ -96,16 +96,18 @@ const START: State<2> = State {
     velocity: [0.0; 2],
 };
 
+/// The pose of both rates: hanging, with the elbow at its angle of the start. A strong brake keeps it there.
+const HANGING: [f64; 2] = [-FRAC_PI_2, START.position[1]];
+
 impl StiffScene {
     /// The scene whose elbow's rate is `ratio` times that of its swing.
     pub fn new(ratio: f64) -> Self {
-        let (arm, hanging) = (Arm::<2>::default(), [-FRAC_PI_2, 0.0]);
-        let swing =
-            (gravity_gradient(&arm, &hanging)[0] / mass_matrix(&arm, &hanging)[0][0]).sqrt();
-        let unit = forward_dynamics(&arm, &hanging, &[0.0; 2], &[0.0, 1.0])[1];
-        let still = forward_dynamics(&arm, &hanging, &[0.0; 2], &[0.0; 2])[1];
+        let arm = Arm::<2>::default();
+        let pull = gravity_gradient(&arm, &HANGING)[0];
+        let swing = (pull / mass_matrix(&arm, &HANGING)[0][0]).sqrt();
+        let linear = Linear::at(&ControlLoop::free(arm), &HANGING, &[false; 2]);
         let gains = Gains {
-            kd: [0.0, ratio * swing / (unit - still)],
+            kd: [0.0, ratio * swing / linear.inverse_mass[(1, 1)]],
             ..no_control()
         };
         let control = ControlLoop::new(arm, gains, Setpoint::default());
@@ -118,10 +120,8 @@ impl StiffScene {
             (0..OUTPUTS).map(output).collect()
         };
         let [fine, other] = [Solver::Rodas3, Solver::ImplicitMidpoint].map(outputs);
-        let differences = fine
-            .iter()
-            .zip(&other)
-            .map(|(one, other)| largest_difference(one, other));
+        let pairs = fine.iter().zip(&other);
+        let differences = pairs.map(|(one, other)| largest_difference(one, other));
         Self {
             control,
             ratio,
@@ -145,7 +145,7 @@ impl StiffScene {
         let Solver::Explicit(method) = solver else {
             return None;
         };
-        let linear = Linear::at(&self.control, &[-FRAC_PI_2, 0.0], &[false; 2]);
+        let linear = Linear::at(&self.control, &HANGING, &[false; 2]);
         let limit = largest_timestep(&linear, method, Sampling::Continuous)?;
         Some(DURATION / limit)
     }

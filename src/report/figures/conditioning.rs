@@ -54,10 +54,10 @@ pub(super) fn make(section: &mut Section) {
         digits => number(digits),
     };
     section.findings.push(format!(
-        "**With a last link up to 10⁹ times lighter or heavier than the others, accelerations of bent and stretched \
-         arms lose at most {} of 16 digits**. With the second link folded back onto the first they lose up to {}. The \
-         algorithm loses at most {} of them. The rest is due to the last bits of the angles. Elimination of the mass \
-         matrix loses up to {dense}.",
+        "**Accelerations of bent and stretched 3-link arms lose at most {} of 16 digits, with a last link up to 10⁹ \
+         times lighter or heavier than the others**. With the second link folded back onto the first they lose up to \
+         {}. These are the worst of {count} random states at each of 19 mass ratios. At no ratio is the worst loss more \
+         than {} digits beyond that by the last bits of the angles. Elimination of the mass matrix loses up to {dense}.",
         number(straight),
         number(folded),
         number(own),
