@@ -122,9 +122,7 @@ impl FlowControl {
     pub(super) fn note_written(&mut self, bytes: usize, now: Instant) {
         let bytes = bytes as u64;
         self.written += bytes;
-        if self.room < u64::MAX {
-            self.room = self.room.saturating_sub(bytes);
-        }
+        self.room = self.room.saturating_sub(bytes);
         let is_full = self.history.len() >= MAX_HISTORY;
         match self.history.back_mut() {
             Some((end, first)) if is_full || now < *first + HISTORY_STEP => *end = self.written,
@@ -166,7 +164,7 @@ impl FlowControl {
         let is_read = |stretch: &&(u64, Instant)| stretch.0 <= read;
         let count = self.history.iter().take_while(is_read).count();
         self.history.drain(..count);
-        let oldest = self.history.front().filter(|_| unread > 0);
+        let oldest = self.history.front();
         let age = oldest.map_or(Duration::ZERO, |(_, first)| now.duration_since(*first));
         self.age = age;
         let is_old = |(time, _): &(Instant, u64)| now.duration_since(*time) > RATE_WINDOW;
