@@ -2,9 +2,10 @@
 //!
 //! **Invariant:** the shell that starts the process sets its limits; the machine is not changed.
 
+use std::process::Stdio;
 use std::time::Instant;
 
-use crate::common::{Client, Runtime, is_served_at_last, refusal_of, stat};
+use crate::common::{Client, Logged, Runtime, is_served_at_last, refusal_of, shell, stat};
 
 /// Sets the program's soft limit of open files, under a hard one of 40.
 fn set_soft_limit(runtime: &Runtime, files: usize) {
@@ -47,13 +48,15 @@ fn a_thousand_clients_are_served_and_the_next_gets_the_reason() {
 
 #[test]
 fn with_few_open_files_fewer_clients_are_served_and_the_others_get_the_reason() {
-    let runtime = Runtime::under("ulimit -n 40");
-    let mut served: Vec<Client> = (0..7).map(|_| runtime.connect()).collect();
+    let mut runtime = Logged::start(shell("ulimit -n 40"), Stdio::null());
+    runtime.await_line("the limit of open files is low");
+    let connect = |_| Client::to(runtime.address);
+    let mut served: Vec<Client> = (0..7).map(connect).collect();
     for client in &mut served {
         client.settle();
     }
     // More clients than files: the rest wait in the system's queue until others have received their message.
-    let mut late: Vec<Client> = (0..60).map(|_| runtime.connect()).collect();
+    let mut late: Vec<Client> = (0..60).map(connect).collect();
     for client in &mut late {
         assert!(refusal_of(client).contains("serves 8 clients"));
     }
