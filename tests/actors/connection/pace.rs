@@ -88,7 +88,6 @@ fn a_client_that_takes_half_of_the_messages_is_about_a_second_late_at_most() {
         ] {
             let (late, count, queries) = lateness(queue_length, a_second, chunk).await;
             let case = format!("{queue_length} {a_second} {chunk}: {late:?}, {count}, {queries}");
-            println!("{case}");
             assert!(queries <= 30 * 20, "one in 50 ms: {case}");
             assert!(late < Duration::from_millis(1500), "{case}");
             assert!(
