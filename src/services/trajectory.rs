@@ -69,7 +69,7 @@ fn with_missing_joints(
     names: Option<&Entries<'_>>,
     joints: &[&str],
 ) -> RejectedField {
-    let are_few = |names: &&Entries<'_>| names.count > 0 && names.count == names.first.len();
+    let are_few = |names: &&Entries<'_>| (1..=joints.len()).contains(&names.count);
     let named = names.filter(are_few).and_then(|names| {
         let named = names.first.iter().map(|name| json::text(name));
         named.collect::<Option<Vec<_>>>()

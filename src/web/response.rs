@@ -46,10 +46,15 @@ pub fn file(kind: &'static str, policy: &str, body: impl Into<AnswerBody>) -> Ht
     response
 }
 
+/// The body of an answer with one sentence.
+fn line(sentence: &str) -> String {
+    format!("{sentence}\n")
+}
+
 /// An answer with one sentence.
 #[must_use]
 pub fn text(status: StatusCode, sentence: &str) -> HttpResponse {
-    let body = Bytes::from(format!("{sentence}\n"));
+    let body = Bytes::from(line(sentence));
     let mut response = file("text/plain; charset=utf-8", NOTHING, body);
     *response.status_mut() = status;
     response
@@ -80,7 +85,8 @@ pub(super) fn set(response: &mut HttpResponse, name: HeaderName, value: &str) {
 #[must_use]
 pub fn refusal(status: StatusCode, sentence: &str) -> Vec<u8> {
     let response = text(status, sentence);
-    let length = sentence.len() + 1;
+    let body = line(sentence);
+    let length = body.len();
     let mut message =
         format!("HTTP/1.1 {status}\r\nConnection: close\r\nContent-Length: {length}\r\n");
     for (name, value) in response.headers() {
@@ -88,7 +94,7 @@ pub fn refusal(status: StatusCode, sentence: &str) -> Vec<u8> {
         let value = value.to_str().unwrap_or_default();
         let _ = write!(message, "{name}: {value}\r\n");
     }
-    let _ = write!(message, "\r\n{sentence}\n");
+    let _ = write!(message, "\r\n{body}");
     message.into_bytes()
 }
 

@@ -11,18 +11,21 @@ use tokio::io::{AsyncReadExt, duplex};
 use tokio::time::Instant;
 
 /// Thirty seconds of 60 messages a second for a client that takes `a_second` of them, and reads `chunk` bytes at a
-/// time. Returns its longest delay, and the number of its messages.
-async fn lateness(queue_length: u64, a_second: u32, chunk: usize) -> (Duration, usize) {
+/// time. Returns its longest delay, the number of its messages, and that of the queries of its unread bytes.
+async fn lateness(queue_length: u64, a_second: u32, chunk: usize) -> (Duration, usize, u32) {
     let gateway = Gateway::bare().await;
-    let unread = Rc::new(Cell::new(0));
+    let (unread, queries) = (Rc::new(Cell::new(0)), Rc::new(Cell::new(0)));
     let (mut client, theirs) = duplex(WIDE);
     let mut theirs = Watched::new(theirs);
     let count = Rc::clone(&unread);
     theirs.on_write = Box::new(move |bytes| count.set(count.get() + bytes.len()));
     let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
-    let source = Rc::clone(&unread);
+    let (source, asked) = (Rc::clone(&unread), Rc::clone(&queries));
     Connection::start_reading(
-        Box::new(move || Some(source.get())),
+        Box::new(move || {
+            asked.set(asked.get() + 1);
+            Some(source.get())
+        }),
         Arc::default(),
         Ends::default(),
         theirs,
@@ -69,7 +72,7 @@ async fn lateness(queue_length: u64, a_second: u32, chunk: usize) -> (Duration, 
         }
     }
     publishing.abort();
-    (late, count)
+    (late, count, queries.get())
 }
 
 #[test]
@@ -83,9 +86,9 @@ fn a_client_that_takes_half_of_the_messages_is_about_a_second_late_at_most() {
             (0, 20, 8192),
             (0, 10, 300),
         ] {
-            let (late, count) = lateness(queue_length, a_second, chunk).await;
-            let case = format!("{queue_length} {a_second} {chunk}: {late:?}, {count}");
-            println!("{case}");
+            let (late, count, queries) = lateness(queue_length, a_second, chunk).await;
+            let case = format!("{queue_length} {a_second} {chunk}: {late:?}, {count}, {queries}");
+            assert!(queries <= 30 * 20, "one in 50 ms: {case}");
             assert!(late < Duration::from_millis(1500), "{case}");
             assert!(
                 count > 22 * a_second as usize,
@@ -98,8 +101,9 @@ fn a_client_that_takes_half_of_the_messages_is_about_a_second_late_at_most() {
 #[test]
 fn a_client_that_reads_everything_loses_nothing_and_has_no_delay() {
     in_virtual_time(async {
-        let (late, count) = lateness(1, 100_000, 8192).await;
+        let (late, count, queries) = lateness(1, 100_000, 8192).await;
         assert_eq!(count, 30 * 60 - 1);
+        assert!(queries <= 100, "one in 300 ms: {queries}");
         assert!(late < Duration::from_millis(3), "{late:?}");
     });
 }

@@ -34,7 +34,7 @@
 //! | `steps = 1`, `params = 1` | this many calls are kept |
 //! | `answer steps json` | the oldest of them succeeds with these values, or with none, and ends; `reply` leaves it open until `release`, `refuse steps why` refuses it, `lose steps` drops it, and `gone steps` drops it if its client has left |
 //! | `connections = 1`, `dropped = 1`, `taken = 1` | clients that are served, messages that were dropped, permits for long frames that are taken |
-//! | `workers busy`, `workers free` | from here on all threads for long frames and for lists are occupied, or free |
+//! | `workers busy`, `workers full`, `workers free` | from here on all threads for long frames and for lists are occupied, or those for medium ones too, or none |
 //! | `shutting down`, `finish all` | the two messages by which the runtime ends its clients |
 //! | `floating` | gravity and gains are zero and the controller is on: an arm at rest stays where it is |
 //! | `for x \| y in 1 \| a; 2 \| b` | the steps up to `end` run once for each row, with its values in place of `@x` and `@y` |
@@ -255,10 +255,13 @@ impl World {
             "release" => self.kept.release().await,
             "workers" => {
                 self.busy.clear();
-                for kind in [WorkKind::Long, WorkKind::Listing].repeat(PLACES) {
-                    if rest == "busy" {
-                        self.busy.extend(WorkPermit::take(kind).await);
-                    }
+                let kinds: &[_] = match rest {
+                    "full" => &[WorkKind::Long, WorkKind::Listing, WorkKind::Usual],
+                    "busy" => &[WorkKind::Long, WorkKind::Listing],
+                    _ => &[],
+                };
+                for kind in kinds.repeat(PLACES) {
+                    self.busy.extend(WorkPermit::take(kind).await);
                 }
                 settle().await;
             }

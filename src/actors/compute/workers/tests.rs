@@ -87,11 +87,22 @@ fn a_task_waiting_for_memory_retries_while_others_compute() {
     let (done, endless) = mpsc::channel();
     let (began, seen) = mpsc::channel();
     pool.submit(Box::new(Endless(endless)));
-    pool.submit(Box::new(InitiallyFull { tries: 3, began }));
+    let full = || {
+        Box::new(InitiallyFull {
+            tries: 3,
+            began: began.clone(),
+        })
+    };
+    pool.submit(full());
     seen.recv_timeout(Duration::from_secs(60))
         .expect("room is looked for again");
     drop(done);
     wait_until_idle(&pool);
+    // Alone it tries again after a pause.
+    let since = std::time::Instant::now();
+    pool.submit(full());
+    seen.recv().unwrap();
+    assert!(since.elapsed() >= 3 * TRY_AGAIN);
 }
 
 #[test]

@@ -137,10 +137,7 @@ impl<S: ClientStream> Connection<S> {
     fn counting_dropped(&mut self, act: impl FnOnce(&mut Outbox)) {
         let before = self.outbox.dropped();
         act(&mut self.outbox);
-        let dropped = self.outbox.dropped() - before;
-        if dropped > 0 {
-            self.gauges.add_dropped(dropped);
-        }
+        self.gauges.add_dropped(self.outbox.dropped() - before);
     }
 
     /// Adds a response or a status. Discards held-back messages on `superseded` topics, because they are older.

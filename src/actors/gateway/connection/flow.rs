@@ -16,6 +16,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
+pub(super) use self::sockets::has_closed;
 use crate::protocol::outbox::MAX_AGE;
 
 /// The two addresses of a client's connection. If one is unknown, the client counts as local.
@@ -47,18 +48,12 @@ pub type UnreadSource = Box<dyn FnMut() -> Option<usize>>;
 
 /// The source for a client with these ends.
 pub(super) fn between(ends: Ends) -> UnreadSource {
-    let mut is_known = ends.peer.port() != 0;
+    let mut is_known = true;
     Box::new(move || {
         let unread = is_known.then(|| sockets::unread(ends)).flatten();
         is_known = unread.is_some();
         unread
     })
-}
-
-/// Whether the client has closed its socket, if it is on this machine. A client that has only stopped sending may still
-/// read.
-pub(super) fn has_closed(ends: Ends) -> bool {
-    ends.peer.port() != 0 && sockets::has_closed(ends)
 }
 
 /// Nothing more is written once a byte has been unread for this time. Python reads 8 KiB at a time, which is half a
@@ -122,9 +117,7 @@ impl FlowControl {
     pub(super) fn note_written(&mut self, bytes: usize, now: Instant) {
         let bytes = bytes as u64;
         self.written += bytes;
-        if self.room < u64::MAX {
-            self.room = self.room.saturating_sub(bytes);
-        }
+        self.room = self.room.saturating_sub(bytes);
         let is_full = self.history.len() >= MAX_HISTORY;
         match self.history.back_mut() {
             Some((end, first)) if is_full || now < *first + HISTORY_STEP => *end = self.written,
@@ -166,7 +159,7 @@ impl FlowControl {
         let is_read = |stretch: &&(u64, Instant)| stretch.0 <= read;
         let count = self.history.iter().take_while(is_read).count();
         self.history.drain(..count);
-        let oldest = self.history.front().filter(|_| unread > 0);
+        let oldest = self.history.front();
         let age = oldest.map_or(Duration::ZERO, |(_, first)| now.duration_since(*first));
         self.age = age;
         let is_old = |(time, _): &(Instant, u64)| now.duration_since(*time) > RATE_WINDOW;
@@ -244,8 +237,9 @@ mod sockets {
         Some((received + value(ends.local, ends.peer, SENT)?) as usize)
     }
 
-    /// Whether the client's socket belongs to no program any more.
-    pub(super) fn has_closed(ends: Ends) -> bool {
+    /// Whether the client has closed its socket, if it is on this machine: the socket belongs to no program any more. A
+    /// client that has only stopped sending may still read.
+    pub(in crate::actors::gateway::connection) fn has_closed(ends: Ends) -> bool {
         value(ends.peer, ends.local, INODE) == Some(0)
     }
 
@@ -348,7 +342,7 @@ mod sockets {
         None
     }
 
-    pub(super) fn has_closed(_: Ends) -> bool {
+    pub(in crate::actors::gateway::connection) fn has_closed(_: Ends) -> bool {
         false
     }
 }

@@ -10,9 +10,9 @@ use bytes::Bytes;
 use serde_json::value::RawValue;
 
 use super::Subscriber;
+use super::forwarded::own_id;
 use crate::actors::resources::memory::{Permit, cover_message};
 use crate::protocol::messages;
-use crate::protocol::names::OWN_ID_PREFIX;
 use crate::protocol::op::{Compression, Encoding};
 use crate::protocol::outbox::MAX_MESSAGE;
 use crate::protocol::ros::{cbor, stamps};
@@ -61,39 +61,32 @@ impl ToEncode {
 
     /// Makes the form.
     pub(super) fn make(&self) -> Made {
-        let all = self.plain.len();
         let mut made = Made::default();
         for message in series::messages(self.plain.clone()) {
-            let is_alone = message.len() == all;
-            let message = match self.encode(&message) {
-                Some(Some(encoded)) => cover_message(self.permit.as_ref(), encoded),
-                Some(None) if is_alone => message,
-                // A copy, because a slice would keep the whole series in memory.
-                Some(None) => Bytes::copy_from_slice(&message),
-                None => {
-                    made.lost += 1;
-                    continue;
+            match self.encode(&message) {
+                Some(encoded) => {
+                    let covered = cover_message(self.permit.as_ref(), encoded);
+                    made.messages.push(covered);
                 }
-            };
-            made.messages.push(message);
+                None => made.lost += 1,
+            }
         }
         made
     }
 
-    /// Encodes one message. Returns `None` if that is impossible, and `Some(None)` if the message is unchanged.
-    #[allow(clippy::option_option, reason = "one is dropped, the other is not")]
-    fn encode(&self, plain: &Bytes) -> Option<Option<Bytes>> {
+    /// Encodes one message. Returns `None` if that is impossible.
+    fn encode(&self, plain: &Bytes) -> Option<Bytes> {
         let (encoding, spelling, type_name) = (self.encoding, &*self.spelling, self.type_name);
         let renamed = (encoding.ros1_stamps).then(|| stamps::with_ros1_names(plain));
         let plain = renamed.as_ref().unwrap_or(plain);
         if encoding.compression == Compression::None {
             let size = encoding.fragment_size;
             let Some(size) = size.filter(|size| plain.len() > *size) else {
-                return Some(renamed);
+                // A slice would keep the whole series in memory.
+                return Some(Bytes::copy_from_slice(plain));
             };
             let number = self.fragmented.fetch_add(1, Ordering::Relaxed) + 1;
-            let id = format!("{OWN_ID_PREFIX}{number}");
-            return fragments::split(plain, size, &id, MAX_MESSAGE).map(Some);
+            return fragments::split(plain, size, &own_id(number), MAX_MESSAGE);
         }
         let msg = messages::message_text(spelling, plain);
         let msg: &RawValue = serde_json::from_slice(msg).ok()?;
@@ -101,7 +94,7 @@ impl ToEncode {
             Compression::CborRaw => cbor::publish_raw(spelling, type_name?, msg, MAX_MESSAGE)?,
             _ => cbor::publish(spelling, type_name, msg, MAX_MESSAGE)?,
         };
-        Some(Some(Bytes::from(bytes)))
+        Some(Bytes::from(bytes))
     }
 }
 

@@ -68,8 +68,8 @@ pub(super) struct Requests {
     made: u64,
 }
 
-/// The id of request `number` at its provider.
-fn own_id(number: u64) -> String {
+/// The id of request `number` at its provider, or of the pieces of a message.
+pub(super) fn own_id(number: u64) -> String {
     format!("{OWN_ID_PREFIX}{number}")
 }
 

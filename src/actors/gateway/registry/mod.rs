@@ -33,6 +33,7 @@ use self::forwarded::Requests;
 use self::kept::{Kept, KeptEntry, Registrations};
 use self::places::Places;
 use crate::actors::ConnectionId;
+use crate::actors::gateway::limits::MAX_BACKLOG;
 pub use crate::actors::node::Nodes;
 use crate::actors::node::{Barrier, ClientLink, Done, FrameKind, Respond, guard};
 use crate::actors::resources::gauges::Gauges;
@@ -161,6 +162,11 @@ impl Client {
     /// Bytes of responses that wait to be written to it.
     fn backlog(&self) -> usize {
         self.outlets.backlog.load(Ordering::Relaxed)
+    }
+
+    /// Whether so many wait that other clients' calls and answers to it are refused.
+    fn is_congested(&self) -> bool {
+        self.backlog() > MAX_BACKLOG
     }
 }
 

@@ -10,9 +10,9 @@ use bytes::Bytes;
 use serde_json::json;
 use tokio::time::{Instant, sleep_until};
 
-use super::forwarded::Forwarded;
+use super::forwarded::{Forwarded, own_id};
 use super::refusal::Refusal;
-use super::{FrameOrigin, Handled, RefuseCalls, Registry, Tapped};
+use super::{Client, FrameOrigin, Handled, RefuseCalls, Registry, Tapped};
 use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
 use crate::actors::node::{
     ActionClient, ActionRequest, Caller, CancelSent, Done, ForwardGoal, Route, ServiceCall, guard,
@@ -20,7 +20,7 @@ use crate::actors::node::{
 use crate::actors::resources::memory::cover_message;
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
-use crate::protocol::names::{self, OWN_ID_PREFIX};
+use crate::protocol::names;
 use crate::protocol::op::fields::mistyped;
 use crate::protocol::op::{
     ActionGoal, Arguments, CallService, GoalStatus, Problem, ProviderOp, Served,
@@ -30,8 +30,6 @@ use crate::services::{Address, NoService};
 
 /// Calls and goals ended per cleanup, which takes a third of a millisecond.
 const ENDED_IN_A_ROW: usize = 128;
-/// Most digits of a request's number.
-const ID_DIGITS: usize = 20;
 
 // ---- to the runtime's own nodes -------------------------------------------------------------------------------------
 
@@ -342,7 +340,7 @@ impl Registry {
             return Err(Refusal::BadArguments(mistyped(expected, args.raw())));
         }
         let server = self.clients.get(&provider.connection);
-        if server.is_some_and(|server| server.backlog() > MAX_BACKLOG) {
+        if server.is_some_and(Client::is_congested) {
             return Err(Refusal::ProviderBusy(name.to_owned()));
         }
         let Some(caller) = self.clients.get(&origin.from) else {
@@ -388,7 +386,7 @@ impl Registry {
             });
         };
         if let (Some(server), Some(spelling)) = (self.clients.get(&goal.provider), &goal.spelling) {
-            if server.backlog() > MAX_BACKLOG {
+            if server.is_congested() {
                 return Err(Refusal::ProviderBusy(action.to_owned()));
             }
             server.send(messages::cancellation(spelling, &id));
@@ -406,7 +404,7 @@ impl Registry {
             return Err(Refusal::NoAction(action.to_owned()));
         };
         let spelling = &*provider.spelling;
-        let length = messages::cancellation(spelling, OWN_ID_PREFIX).len() + ID_DIGITS;
+        let length = messages::cancellation(spelling, &own_id(u64::MAX)).len();
         let room = MAX_BACKLOG.saturating_sub(server.backlog()) / length;
         let ids = self.requests.cancel_all(action, provider.connection, room);
         for id in &ids {
@@ -459,7 +457,7 @@ impl Registry {
         let Some(caller) = self.clients.get(&request.caller) else {
             return Ok(());
         };
-        if caller.backlog() > MAX_BACKLOG {
+        if caller.is_congested() {
             self.fail(&request, &Refusal::CallerBusy(request.name.to_string()));
             return Ok(());
         }
