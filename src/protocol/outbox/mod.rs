@@ -212,6 +212,12 @@ impl Outbox {
         self.check_sums();
     }
 
+    /// Whether frames are being written.
+    #[must_use]
+    pub fn is_writing(&self) -> bool {
+        !self.writing.is_empty()
+    }
+
     /// The unwritten bytes of the frames that are being written.
     pub fn writing(&self) -> impl ExactSizeIterator<Item = &Bytes> {
         self.writing.iter().map(|frame| &frame.rest)
@@ -315,6 +321,9 @@ impl Outbox {
 
     /// Compares the sums with the messages that they are of. Builds without debug assertions omit it.
     fn check_sums(&self) {
+        if !cfg!(debug_assertions) {
+            return;
+        }
         let queued = || self.topics.iter();
         let held = || self.limits.values().flat_map(|limits| &limits.held);
         let bytes = |message: &QueuedMessage| counted(&message.frame);

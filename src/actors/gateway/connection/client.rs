@@ -163,7 +163,7 @@ impl<S: ClientStream> Connection<S> {
     /// Takes the next frames out of the outbox, if all previous ones were written. Returns whether there are frames to
     /// write. Nothing is held back from a client whose connection is finishing.
     fn take_frames(&mut self) -> bool {
-        if self.outbox.writing().len() > 0 {
+        if self.outbox.is_writing() {
             return true;
         }
         let (has_topics, holds_back) = (self.outbox.has_topics(), self.outbox.holds_back());
@@ -186,7 +186,7 @@ impl<S: ClientStream> Connection<S> {
             outbox.take_frames(now.into_std(), most, WRITE_BYTES);
         });
         self.progress = now;
-        self.outbox.writing().len() > 0
+        self.outbox.is_writing()
     }
 
     /// Notes that `bytes` of the frames were written. Returns whether that allows the client to be read again.
