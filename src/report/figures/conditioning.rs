@@ -56,8 +56,8 @@ pub(super) fn make(section: &mut Section) {
     section.findings.push(format!(
         "**Accelerations of bent and stretched 3-link arms lose at most {} of 16 digits, with a last link up to 10⁹ \
          times lighter or heavier than the others**. With the second link folded back onto the first they lose up to \
-         {}. These are the worst of {count} random states at each of 19 mass ratios. At no ratio is the worst loss more \
-         than {} digits beyond that by the last bits of the angles. Elimination of the mass matrix loses up to {dense}.",
+         {}. These are the worst of {count} random states at each of 19 mass ratios. At every ratio the last bits of \
+         the angles alone lose at most {} digits less. Elimination of the mass matrix loses up to {dense}.",
         number(straight),
         number(folded),
         number(own),
