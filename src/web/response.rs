@@ -46,15 +46,10 @@ pub fn file(kind: &'static str, policy: &str, body: impl Into<AnswerBody>) -> Ht
     response
 }
 
-/// The body of an answer with one sentence.
-fn line(sentence: &str) -> String {
-    format!("{sentence}\n")
-}
-
 /// An answer with one sentence.
 #[must_use]
 pub fn text(status: StatusCode, sentence: &str) -> HttpResponse {
-    let body = Bytes::from(line(sentence));
+    let body = Bytes::from(format!("{sentence}\n"));
     let mut response = file("text/plain; charset=utf-8", NOTHING, body);
     *response.status_mut() = status;
     response
@@ -85,7 +80,7 @@ pub(super) fn set(response: &mut HttpResponse, name: HeaderName, value: &str) {
 #[must_use]
 pub fn refusal(status: StatusCode, sentence: &str) -> Vec<u8> {
     let response = text(status, sentence);
-    let body = line(sentence);
+    let body = &response.body().bytes;
     let length = body.len();
     let mut message =
         format!("HTTP/1.1 {status}\r\nConnection: close\r\nContent-Length: {length}\r\n");
@@ -94,8 +89,8 @@ pub fn refusal(status: StatusCode, sentence: &str) -> Vec<u8> {
         let value = value.to_str().unwrap_or_default();
         let _ = write!(message, "{name}: {value}\r\n");
     }
-    let _ = write!(message, "\r\n{body}");
-    message.into_bytes()
+    message.push_str("\r\n");
+    [message.as_bytes(), body].concat()
 }
 
 /// The body of an answer.

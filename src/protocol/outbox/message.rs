@@ -42,12 +42,3 @@ impl QueuedMessage {
 pub(super) fn counted(frame: &Bytes) -> usize {
     frame.len().min(MEDIUM)
 }
-
-/// A copy of a message from a series, which does not keep the others in memory.
-pub(super) fn by_itself(frame: Bytes, is_part: bool) -> Bytes {
-    if is_part {
-        Bytes::copy_from_slice(&frame)
-    } else {
-        frame
-    }
-}

@@ -23,11 +23,13 @@ use std::time::{Duration, Instant};
 
 use bytes::{Buf, Bytes};
 
-use self::message::{QueuedMessage, by_itself, counted};
+use self::message::{QueuedMessage, counted};
 pub use self::throttle::Throttle;
 use self::throttle::{HeldBack, TopicLimits};
 use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
-use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
+use crate::protocol::wire::series::{
+    by_itself, first_message, first_messages, last_messages, messages,
+};
 
 /// Most bytes of topic messages that wait for one connection, each with [`MESSAGE_BYTES`]: ten seconds of the arm's
 /// own. A message longer than [`MEDIUM`] uses the shared pool and counts as [`MEDIUM`] here, so at most one of them

@@ -114,6 +114,16 @@ pub fn messages(mut frames: Bytes) -> impl Iterator<Item = Bytes> {
     })
 }
 
+/// A message that does not keep the others of its series in memory: a copy if it `is_part` of one.
+#[must_use]
+pub fn by_itself(message: Bytes, is_part: bool) -> Bytes {
+    if is_part {
+        Bytes::copy_from_slice(&message)
+    } else {
+        message
+    }
+}
+
 /// The length of the frame at the start of `bytes`, including its newline, if it has that head and is suitable for a
 /// series.
 fn message(bytes: &[u8], head: &[u8]) -> Option<usize> {

@@ -75,15 +75,16 @@ impl ToEncode {
     }
 
     /// Encodes one message. Returns `None` if that is impossible.
-    fn encode(&self, plain: &Bytes) -> Option<Bytes> {
+    fn encode(&self, message: &Bytes) -> Option<Bytes> {
         let (encoding, spelling, type_name) = (self.encoding, &*self.spelling, self.type_name);
-        let renamed = (encoding.ros1_stamps).then(|| stamps::with_ros1_names(plain));
-        let plain = renamed.as_ref().unwrap_or(plain);
+        let renamed = (encoding.ros1_stamps).then(|| stamps::with_ros1_names(message));
+        let plain = renamed.as_ref().unwrap_or(message);
         if encoding.compression == Compression::None {
             let size = encoding.fragment_size;
             let Some(size) = size.filter(|size| plain.len() > *size) else {
-                // A slice would keep the whole series in memory.
-                return Some(Bytes::copy_from_slice(plain));
+                let is_part = message.len() < self.plain.len();
+                let unchanged = || series::by_itself(message.clone(), is_part);
+                return Some(renamed.unwrap_or_else(unchanged));
             };
             let number = self.fragmented.fetch_add(1, Ordering::Relaxed) + 1;
             return fragments::split(plain, size, &own_id(number), MAX_MESSAGE);

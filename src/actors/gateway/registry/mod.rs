@@ -164,7 +164,7 @@ impl Client {
         self.outlets.backlog.load(Ordering::Relaxed)
     }
 
-    /// Whether so many wait that other clients' calls and answers to it are refused.
+    /// Whether its short responses wait beyond the limit. Then other clients' calls and answers to it are refused.
     fn is_congested(&self) -> bool {
         self.backlog() > MAX_BACKLOG
     }
