@@ -27,6 +27,9 @@ const TRUSTED: f64 = 0.5;
 /// A step shorter than this changes no angle \[rad\].
 const SMALLEST_TRUSTED: f64 = 1e-18;
 
+/// Most searches for the joints whose integral is at its limit.
+const MAX_PASSES: u32 = 30;
+
 /// Distance of the first step away from a saddle \[rad\]: large enough that the descent exceeds rounding.
 const LEAVING: f64 = 1e-3;
 
@@ -50,19 +53,14 @@ pub struct Equilibrium<const N: usize> {
     pub balanced: bool,
 }
 
-/// The equilibrium that the arm reaches from the setpoint. It is the setpoint itself if every joint has an integral,
-/// and the sagging pose otherwise. A free arm hangs. An integral that would have to exceed its limit counts as a
-/// constant effort at the limit.
+/// The equilibrium that the arm reaches from the setpoint. It is the setpoint if every joint has an integral, and the
+/// sagging pose otherwise. A free arm hangs. An integral that would exceed its limit counts as an effort at the limit.
 pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     let (gains, setpoint) = (&control.gains, &control.setpoint);
     if control.is_free() {
-        let is_heavy = control.arm.gravity() > 0.0;
+        let heavy = control.arm.gravity() > 0.0;
         return Equilibrium {
-            position: if is_heavy {
-                hanging()
-            } else {
-                setpoint.position
-            },
+            position: if heavy { hanging() } else { setpoint.position },
             integral: [0.0; N],
             integrating: [false; N],
             balanced: false,
@@ -71,34 +69,30 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     let mut descent = Descent {
         control,
         integrating: control.integrating(),
-        push: std::array::from_fn(|i| gains.kd[i] * setpoint.velocity[i]),
+        integral: [0.0; N],
     };
-    let mut integral = [0.0; N];
-    let mut balanced = false;
-    // Every pass but the last finds a saturated integral and removes its joint from the integrating ones, so there are
-    // at most N + 1.
+    let (mut sag, mut balanced, mut passes) = ([0.0; N], false, 0);
     loop {
-        let (sag, leaves) = descent.settle();
-        balanced |= leaves;
-        let load = descent.gradient(&sag);
-        let mut saturated = false;
-        for i in 0..N {
-            if !descent.integrating[i] {
-                continue;
-            }
-            integral[i] = load[i] / gains.ki[i];
-            if integral[i].abs() > INTEGRAL_LIMIT {
-                saturated = true;
-                integral[i] = INTEGRAL_LIMIT.copysign(integral[i]);
-                descent.integrating[i] = false;
-                descent.push[i] += gains.ki[i] * integral[i];
+        balanced |= descent.settle(&mut sag);
+        let (load, before) = (descent.gradient(&sag), descent.integrating);
+        for i in (0..N).filter(|&i| gains.ki[i] > 0.0) {
+            let integral = &mut descent.integral[i];
+            if before[i] {
+                *integral = load[i] / gains.ki[i];
+                let saturated = integral.abs() > INTEGRAL_LIMIT;
+                *integral = integral.clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT);
+                descent.integrating[i] = !saturated;
+            } else {
+                // Back at the setpoint the integral leaves its limit.
+                descent.integrating[i] = sag[i] == 0.0;
             }
         }
-        if !saturated {
+        passes += 1;
+        if descent.integrating == before || passes == MAX_PASSES {
             return Equilibrium {
                 position: descent.position(&sag),
-                integral,
-                integrating: descent.integrating,
+                integral: descent.integral,
+                integrating: before,
                 balanced,
             };
         }
@@ -109,8 +103,8 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
 struct Descent<'a, const N: usize> {
     control: &'a ControlLoop<N>,
     integrating: [bool; N],
-    /// Constant effort `kd q̇*`, and that of integrals at their limit \[N m\].
-    push: [f64; N],
+    /// Of a joint that does not integrate: zero, or the limit. Then the joint stays on its side of the setpoint.
+    integral: [f64; N],
 }
 
 impl<const N: usize> Descent<'_, N> {
@@ -118,44 +112,51 @@ impl<const N: usize> Descent<'_, N> {
         std::array::from_fn(|i| self.control.setpoint.position[i] + sag[i])
     }
 
+    /// Constant effort `kd q̇*`, and that of an integral at its limit \[N m\].
+    fn push(&self, i: usize) -> f64 {
+        let (gains, rate) = (&self.control.gains, self.control.setpoint.velocity[i]);
+        let saturated = f64::from(u8::from(!self.integrating[i]));
+        gains.kd[i] * rate + saturated * gains.ki[i] * self.integral[i]
+    }
+
+    /// Joints at the setpoint, held by an integral.
+    fn fixed(&self, sag: &[f64; N]) -> [bool; N] {
+        let gradient = self.gradient(sag);
+        let is_back = |i: usize| sag[i] == 0.0 && self.integral[i] * gradient[i] < 0.0;
+        std::array::from_fn(|i| self.integrating[i] || is_back(i))
+    }
+
     /// `∂V/∂y`, joints that integrate included \[N m\].
     fn gradient(&self, sag: &[f64; N]) -> [f64; N] {
         let load = gravity_load(&self.control.arm, &self.position(sag));
-        std::array::from_fn(|i| load[i] + self.control.gains.kp[i] * sag[i] - self.push[i])
+        std::array::from_fn(|i| load[i] + self.control.gains.kp[i] * sag[i] - self.push(i))
     }
 
     fn potential(&self, sag: &[f64; N]) -> f64 {
-        let spring: f64 = (0..N)
-            .map(|i| (0.5 * self.control.gains.kp[i] * sag[i] - self.push[i]) * sag[i])
-            .sum();
-        potential_energy(&self.control.arm, &self.position(sag)) + spring
+        let spring = |i: usize| (0.5 * self.control.gains.kp[i] * sag[i] - self.push(i)) * sag[i];
+        potential_energy(&self.control.arm, &self.position(sag)) + (0..N).map(spring).sum::<f64>()
     }
 
     /// The gradient of the joints that move; zero for the others.
     fn slopes(&self, sag: &[f64; N]) -> [f64; N] {
-        let mut slopes = self.gradient(sag);
-        for i in (0..N).filter(|&i| self.integrating[i]) {
-            slopes[i] = 0.0;
-        }
-        slopes
+        let (gradient, fixed) = (self.gradient(sag), self.fixed(sag));
+        std::array::from_fn(|i| if fixed[i] { 0.0 } else { gradient[i] })
     }
 
-    /// Descends from zero sag to a pose in which the arm rests. Also returns whether zero sag is an unstable
-    /// equilibrium, from which an arm falls to either side.
-    fn settle(&self) -> ([f64; N], bool) {
-        let mut sag = self.descend([0.0; N]);
+    /// Descends to rest. Returns whether zero sag is an unstable equilibrium, from which an arm falls to either side.
+    fn settle(&self, sag: &mut [f64; N]) -> bool {
+        *sag = self.descend(*sag);
         let mut balanced = false;
         for saddle in 0..MAX_SADDLES {
-            let Some(way) = self.way_down(&sag) else {
+            let Some(way) = self.way_down(sag) else {
                 break;
             };
-            let still = sag.iter().all(|sag| sag.abs() < BALANCED);
-            balanced |= saddle == 0 && still;
-            let sides = [1.0, -1.0].map(|side| moved(&sag, side * LEAVING, &way));
+            balanced |= saddle == 0 && sag.iter().all(|sag| sag.abs() < BALANCED);
+            let sides = [1.0, -1.0].map(|side| moved(sag, side * LEAVING, &way));
             let [one, other] = sides.map(|side| self.potential(&side));
-            sag = self.descend(sides[usize::from(other < one)]);
+            *sag = self.descend(sides[usize::from(other < one)]);
         }
-        (sag, balanced)
+        balanced
     }
 
     /// Descends to a point of zero gradient, by Newton steps within a trust radius. Where the potential curves down in
@@ -174,6 +175,10 @@ impl<const N: usize> Descent<'_, N> {
             let length = longest(&step);
             let part = (radius / length).min(1.0);
             let next = moved(&sag, part, &step);
+            let next = std::array::from_fn(|i| {
+                let is_beyond = !self.integrating[i] && self.integral[i] * next[i] > 0.0;
+                if is_beyond { 0.0 } else { next[i] }
+            });
             let height = self.potential(&sag);
             // Near the minimum the potential is constant within rounding, and only the gradient shows progress.
             let rounding = 1e-13 * (height.abs() + size(&stiffness));
@@ -206,18 +211,13 @@ impl<const N: usize> Descent<'_, N> {
     /// `∂²V/∂y²` \[N m/rad\] of the joints that move; the others are decoupled, with 1 on the diagonal.
     fn stiffness(&self, sag: &[f64; N]) -> Matrix {
         let gradient = gravity_gradient(&self.control.arm, &self.position(sag));
+        let fixed = self.fixed(sag);
         Matrix::from_fn(N, |i, j| {
-            match (i == j, self.integrating[i] || self.integrating[j]) {
-                (true, true) => 1.0,
-                (false, true) => 0.0,
-                (_, false) => {
-                    gradient[i.max(j)]
-                        + if i == j {
-                            self.control.gains.kp[i]
-                        } else {
-                            0.0
-                        }
-                }
+            let same = f64::from(u8::from(i == j));
+            if fixed[i] || fixed[j] {
+                same
+            } else {
+                gradient[i.max(j)] + same * self.control.gains.kp[i]
             }
         })
     }

@@ -76,9 +76,9 @@ pub struct GainsRequirements {
 pub struct SuggestedGains<const N: usize> {
     /// The gains.
     pub gains: Gains<N>,
-    /// The smallest timestep limit over all poses \[s\], or its bound if not `certified`; `None` if there is no limit.
+    /// A timestep up to which every pose is stable \[s\]; `None` if there is no limit.
     pub limit: Option<f64>,
-    /// Whether limit and bound agree to 1 %.
+    /// Whether the smallest limit over all poses is within 1 % of it.
     pub certified: bool,
     /// The longest settling time of the moves \[s\].
     pub settled_after: f64,
@@ -119,7 +119,7 @@ pub async fn search_gains<const N: usize>(
         for paces in 0..MAX_PACES {
             control.gains = scaled(&control.arm, shape, pace);
             let limits = limits::search_limits(control).await;
-            let limit = limits.trusted();
+            let limit = limits.bound.or(limits.minimum_held);
             let is_short = limit.is_some_and(|limit| limit < requirements.margin * timestep);
             // The loop is too fast, or its springs hardly hold the load. Some faster loops decide which.
             if is_short && limit > Some(0.0) && paces >= SOFT_PACES {

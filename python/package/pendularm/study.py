@@ -145,10 +145,9 @@ class SuggestedGains:
     kd: Floats
     """[N m s/rad], (links,)."""
     timestep_limit: float | None
-    """The smallest timestep limit over all poses [s], or its lower bound if they differ by more than 1 %; `None` if
-    nothing limits."""
+    """A timestep up to which every pose is stable [s]; `None` if nothing limits."""
     certified: bool
-    """Whether they differ by less."""
+    """Whether the smallest limit over all poses is within 1 % of it."""
     margin: float | None
     """This limit divided by the timestep."""
     settled_after: float
