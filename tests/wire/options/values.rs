@@ -62,7 +62,6 @@ const REFUSED: &str = "\
 --clients=4097 | --clients must be a whole number from 1 to 4096, got \"4097\"
 --clients=-1 | --clients must be a whole number from 1 to 4096, got \"-1\"
 --seed=18446744073709551616 | --seed must be a whole number from 0 to 18446744073709551615, got \"18446744073709551616\"
---seed=-1 | --seed must be a whole number from 0 to 18446744073709551615, got \"-1\"
 --log=loud | --log must be off, error, warn, info, debug or trace, got \"loud\"
 --log-format=xml | --log-format must be text or json, got \"xml\"
 --token=my secret | --token must be printable ASCII without spaces
