@@ -21,22 +21,26 @@ const HTTP_PORT: u16 = 80;
 /// The default port of `https`, which a proxy may use.
 const HTTPS_PORT: u16 = 443;
 
-/// Reads an address as `host:port`, the host in lower case; a URL's path is left out.
+/// Reads an address or a URL as `host:port`, the host in lower case. A URL's path is left out.
+#[must_use]
+pub fn read_url(text: &str) -> Option<String> {
+    let rest = match text.split_once("://") {
+        Some((scheme, rest)) if SCHEMES.iter().any(|one| one.eq_ignore_ascii_case(scheme)) => rest,
+        Some(_) => return None,
+        None => text,
+    };
+    read(rest.split(['/', '?', '#']).next()?)
+}
+
+/// Reads a port, a host or both as `host:port`, the host in lower case.
 #[must_use]
 pub fn read(text: &str) -> Option<String> {
-    let text = text.to_ascii_lowercase();
-    let rest = match text.split_once("://") {
-        Some((scheme, rest)) if SCHEMES.contains(&scheme) => rest,
-        Some(_) => return None,
-        None => &text,
-    };
-    let authority = rest.split(['/', '?', '#']).next()?;
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|one| one.is_ascii_digit());
-    let (host, port) = match authority.rsplit_once(':') {
+    let (host, port) = match text.rsplit_once(':') {
         Some((host, port)) if is_number(port) => (host, port.parse().ok()?),
-        _ if is_number(authority) => ("", authority.parse().ok()?),
-        _ if authority.is_empty() => return None,
-        _ => (authority, PORT),
+        _ if is_number(text) => ("", text.parse().ok()?),
+        _ if text.is_empty() => return None,
+        _ => (text, PORT),
     };
     let host = Host::parse(if host.is_empty() { HOST } else { host })?;
     Some(format!("{host}:{port}"))
@@ -160,7 +164,7 @@ mod tests {
             ("http://arm.example?token=secret", "arm.example:9095"),
             ("tcp://:9096", "127.0.0.1:9096"),
         ] {
-            assert_eq!(read(text).as_deref(), Some(address), "{text}");
+            assert_eq!(read_url(text).as_deref(), Some(address), "{text}");
         }
         for text in [
             "",
@@ -179,7 +183,7 @@ mod tests {
             "a b:80",
             "a:1:2",
         ] {
-            assert_eq!(read(text), None, "{text}");
+            assert_eq!(read_url(text), None, "{text}");
         }
     }
 }

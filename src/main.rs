@@ -3,6 +3,7 @@
 //! **Invariant:** nothing here panics, even if standard output or standard error is closed, full or
 //! broken.
 
+use std::ffi::{OsStr, OsString};
 #[cfg(feature = "record")]
 use std::fs::File;
 #[cfg(feature = "record")]
@@ -12,6 +13,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 use std::process::ExitCode;
 
+use clap::{Arg, Args, Command};
 use pendularm::actors::{panics, runtime};
 #[cfg(feature = "cli")]
 use pendularm::command::{self, CommandError};
@@ -114,6 +116,18 @@ fn replay(path: &Path) -> ExitCode {
     }
 }
 
+/// Warns of misspelled variables, such as `ARM_SIM_LINK`.
+fn warn_of_unknown_variables() {
+    let server = Options::augment_args(Command::new("server"));
+    let known: Vec<&OsStr> = server.get_arguments().filter_map(Arg::get_env).collect();
+    let names = std::env::vars_os().map(|(name, _)| name);
+    let mut unknown: Vec<OsString> = names.filter(|name| !known.contains(&&**name)).collect();
+    unknown.retain(|name| name.to_string_lossy().starts_with("ARM_SIM_"));
+    if !unknown.is_empty() {
+        tracing::warn!(?unknown, "variables without effect; --help lists all");
+    }
+}
+
 fn serve(options: &Options) -> ExitCode {
     let log = match logging::start(options.log, options.log_format) {
         Ok(log) => log,
@@ -122,6 +136,7 @@ fn serve(options: &Options) -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
+    warn_of_unknown_variables();
     let lines = log.clone();
     panics::end_with(move |what| {
         lines.say(&format!("pendularm: internal error, ending: {what}"));

@@ -57,7 +57,7 @@ pub struct RuntimeOptions {
 /// An address with a port. Its name is resolved later.
 fn read_address(text: &str) -> Result<String, String> {
     let needs = "a port, a host, both or a URL without TLS, such as 9095, 127.0.0.1:9095 or ws://127.0.0.1:9095/";
-    needed(address::read(text), needs, text)
+    needed(address::read_url(text), needs, text)
 }
 
 /// A number from 1e-6 to 1e6.
