@@ -71,7 +71,7 @@ export const STEPS = [
   },
   {
     id: "look", title: "Look closely",
-    text: "Each bar is the computed speed of the last joint at one measurement, after a tiny push without gravity. The arm on the left starts beside the pose that the controller holds, in slow motion: two measurements a second.",
+    text: "Each bar is the speed of the last joint at one measurement, computed without gravity after a tiny push. The arm itself starts beside the pose that the controller holds. It moves in slow motion: two measurements a second.",
     scene: (links) => controlled(links, BEYOND[links]),
     offset: [0, 0.02, 0], paused: true,
     chart: "bars", dial: "period",

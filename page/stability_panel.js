@@ -139,7 +139,7 @@ const push = latestOnly(async ({ loop, key }) => {
   if (key !== pushAsked || !found) return;
   heights = found;
   const outcome = isFree(loop.gains) ? "the push becomes a swing, which nothing damps"
-    : `the push ${shrinks(heights) ? "dies away" : "does not die away"} within ${LOOKS} ${steps > 1 ? "measurements" : "steps"}`;
+    : `the push ${shrinks(heights) ? "shrinks" : "does not shrink"} over ${LOOKS} ${steps > 1 ? "measurements" : "steps"}`;
   setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${steps > 1 ? "a control period of " : ""}${duration(steps * timestep)}: ${outcome}.`);
   bars.redraw();
 }, ASK_MS);
