@@ -231,13 +231,13 @@ class Tasks(CourseTest):
         link = self.page.run("own('views.js').then((share) => share.address())")
         self.assertIn("#step=6&links=2", link)
         self.page.click("#view-switch")
-        self.page.until("document.querySelector('#period-field input[type=number]').checkVisibility()")
-        self.assertEqual(self.page.run("document.querySelector('#period-field input[type=number]').value"), "5.5")
+        self.page.until("document.querySelector('#period-field input[type=number]').checkVisibility() && document.querySelector('#period-field input[type=number]').value === '5.5'")
         self.page.click("#view-switch")
         self.page.until("document.querySelector('#course').checkVisibility()")
 
 
 class Access(CourseTest):
+    view = {"width": 900, "height": 620}  # of the frame in docs/page.md
     def test_axe_finds_nothing_in_any_step(self):
         for number in range(1, STEPS + 1):
             self.step(number)
