@@ -48,15 +48,15 @@ class Tasks(CourseTest):
             self.assertEqual(settings(), before)
 
     def test_holding_ticks_when_the_tip_arrives(self):
+        self.page.run("document.querySelector('input[name=drag][value=setpoint]').click(), document.querySelectorAll('#goal-body input')[4].value = 100")  # as left in the Workbench
         self.page.click("#course-start")
         self.wait(lambda: self.values("/pid_controller/enable")["data"], "the controller")
         self.page.drag(self.on_canvas((1.9, 0.1)), self.on_canvas((0.6, 1.2)))
         self.done("the tip has arrived")
         self.wait(lambda: math.dist(self.runtime.end_effector(), (0.6, 1.2)) < 0.02, "where the drag ended")
-        self.answer("It sets them to zero")
-        self.page.until("document.querySelector('#course-question .note').textContent.startsWith('Not that one')")
-        self.answer("It holds the torques as they are")
-        self.page.until("document.querySelector('#course-question .note').textContent.startsWith('Right.')")
+        for text, verdict in (("It sets them to zero", "Not that one"), ("It holds the torques as they are", "Right.")):
+            self.answer(text)
+            self.page.until(f"document.querySelector('#course-question .note').textContent.startsWith('{verdict}')")
 
     def test_the_mark_comes_after_the_guess_and_the_shaking(self):
         self.step(2)
