@@ -2,7 +2,7 @@
 // reset.
 // Invariant: every change can be undone, and refusals are shown.
 
-import { announce, byId, passFocus } from "./dom.js";
+import { announce, byId, passFocus, warn } from "./dom.js";
 import { inPageNames } from "./format.js";
 import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, setState } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
@@ -18,7 +18,7 @@ export function remember() {
 }
 
 function showUndo() {
-  const leadsBack = undo.leadsBackFrom(presentSettings(state));
+  const leadsBack = state.connection === "open" && undo.leadsBackFrom(presentSettings(state));
   if (!leadsBack) passFocus(byId("undo"));
   byId("undo").disabled = !leadsBack;
 }
@@ -27,22 +27,27 @@ export function startActions() {
   byId("undo").addEventListener("click", takeBack);
   byId("defaults").addEventListener("click", async () => {
     remember();
-    await apply(DEFAULTS[state.links]);
-    announce("All settings are the defaults again.");
+    report(await apply(DEFAULTS[state.links]), "All settings are the defaults again.");
   });
   watch("links", () => {
     undo.past.length = 0;
     showUndo();
   });
-  watch(["integrator", "params", "gains", "period", "enabled", "setpoint"], showUndo);
+  watch(["connection", "integrator", "params", "gains", "period", "enabled", "setpoint"], showUndo);
+}
+
+/** Announces the refusals, or that there are none. @param {string} refused @param {string} done */
+function report(refused, done) {
+  if (refused) warn(refused);
+  else announce(done);
 }
 
 export async function takeBack() {
+  if (byId("undo").disabled) return;
   const settings = undo.take(presentSettings(state));
   showUndo();
   if (!settings) return;
-  await apply(settings);
-  announce("Undone.");
+  report(await apply(settings), "Undone.");
 }
 
 /** Applies the given settings, and returns the text of all refusals. The controller is last, so it never acts with half of the settings. */

@@ -103,11 +103,12 @@ function end() {
   if (lastPlace?.answered) finish(lastPlace);
 }
 
-/** The mode chosen beside the view, because a touch screen has no keys. Shift means the setpoint. @returns {Mode} */
+/** The mode chosen beside the view, because a touch screen has no keys. Shift means the setpoint. The course has no choice. @returns {Mode} */
 function modeOf(event) {
   /** @type {HTMLInputElement} */
   const chosen = document.querySelector("input[name=drag]:checked");
-  return event.shiftKey ? "setpoint" : /** @type {Mode} */ (chosen.value);
+  if (event.shiftKey) return "setpoint";
+  return state.view === "course" ? "goal" : /** @type {Mode} */ (chosen.value);
 }
 
 /** Whether a touch is on the end effector. */

@@ -45,7 +45,7 @@ function controlled(links, period, changed = {}) {
 export const STEPS = [
   {
     id: "hold", title: "A controller holds the arm",
-    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, the end effector, and the controller takes it there.",
+    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, which is called the end effector. The controller moves it to the new place.",
     scene: (links) => controlled(links, 0.001),
     chart: "velocity", dial: null,
     task: { text: "Drag the end effector to a new place, and wait until it arrives.", done: ({ reached }) => reached },
@@ -71,14 +71,14 @@ export const STEPS = [
   },
   {
     id: "look", title: "Look closely",
-    text: "Each bar is the computed speed of the last joint at one measurement, after a tiny push without gravity. The arm on the left starts beside the pose that the controller holds, in slow motion: two measurements a second.",
+    text: "Each bar is the speed of the last joint at one measurement, computed without gravity after a tiny push. The arm itself starts beside the pose that the controller holds. It moves in slow motion: two measurements a second.",
     scene: (links) => controlled(links, BEYOND[links]),
     offset: [0, 0.02, 0], paused: true,
     chart: "bars", dial: "period",
     task: { text: "Shorten the period until the bars shrink.", done: ({ shrinks }) => shrinks },
     question: {
       text: "Beyond the limit each bar points the other way. Why?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
-      because: "The torque is held too long. It pushes the joint past the target, and beyond the limit further each time.",
+      because: "The torque is held too long. It pushes the joint past the target. Beyond the limit each push goes further than the one before.",
     },
   },
   {
@@ -89,12 +89,12 @@ export const STEPS = [
     task: { text: "Try all four methods at this period.", done: ({ methods }) => methods.size === ALL },
     question: {
       text: "Why does a better method not help?", answers: ["The controller still measures as rarely", "Euler is exact enough", "The controller is too weak"], right: 0,
-      because: "The limit comes from the hold between two measurements. A real robot has the same limit, without any method.",
+      because: "The limit comes from the hold between two measurements. A real robot has no method, but the same limit.",
     },
   },
   {
     id: "timestep", title: "A finer timestep?",
-    text: "The simulation has its own clock, the timestep. A shorter one makes the computed motion more exact. The method and the control period, above the chart, stay the same.",
+    text: "The simulation has its own clock, the timestep. A shorter one makes the computed motion more exact. The method and the control period stay the same. They are named above the chart.",
     scene: (links) => controlled(links, WITHIN[links], { integrator: { method: "midpoint", timestep: WITHIN[links] } }),
     chart: "errors", dial: "timestep",
     task: { text: "Make the error of the method 100 times smaller.", done: ({ gain }) => gain >= MUCH },
@@ -127,7 +127,7 @@ export const STEPS = [
   },
   {
     id: "price", title: "The price of accuracy",
-    text: "Each dot is one run: its error over its run time. Solid lines show the error of the method. Dashed lines show the error of the hold. A cross marks a run that diverged.",
+    text: "Each dot is one run, with its error and its run time. Solid lines show the error of the method. Dashed lines show the error of the hold. A cross marks a run that diverged.",
     scene: (links) => controlled(links, WITHIN[links]),
     chart: "ladder", dial: null,
     task: { text: "Measure the four methods.", done: ({ measured }) => measured },
@@ -138,7 +138,7 @@ export const STEPS = [
   },
   {
     id: "extreme", title: "Stiff and extreme",
-    text: "Thirty-nine arms that are hard to simulate: light links, high gains, extreme numbers. Click a picture to start its scene. Some scenes need another number of links. The sentence describes a correct simulation.",
+    text: "Thirty-nine arms that are hard to simulate: light links, high gains, extreme numbers. Click a picture to start its scene. Some scenes need another number of links. The sentence under a picture describes the correct motion.",
     scene: (links) => structuredClone(DEFAULTS[links]),
     chart: "pictures", dial: null,
     task: { text: "Start three of them.", done: ({ scenes }) => scenes.size >= SOME_SCENES },

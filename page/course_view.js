@@ -116,11 +116,11 @@ export function stepInLink() {
   return state.view === "course" ? `step=${at + 1}&` : "";
 }
 
-/** Reloads the page at the same step, for an arm with this number of links. */
-export function chooseLinks(links) {
+/** Reloads the page for an arm with this number of links, at the same step or at `hash`. */
+export function chooseLinks(links, hash = `${stepInLink()}links=${links}`) {
   const address = new URL(location.href);
   address.searchParams.delete("links");
-  address.hash = `${stepInLink()}links=${links}`;
+  address.hash = hash;
   setAddress(address);
   location.reload();
 }
@@ -166,10 +166,11 @@ async function begin() {
 
 /** The arm takes two control steps a second. */
 async function slowMotion(mine) {
-  for (let k = 0; k < STEPS_SHOWN && mine === now && state.view === "course"; k += 1) {
+  for (let k = 0; k < STEPS_SHOWN && mine === now;) {
     await new Promise((done) => setTimeout(done, LOOK_MS));
     if (mine !== now || state.view !== "course" || !state.paused || document.hidden) continue;
     await stepArm(stepsPerUpdate(state));
+    k += 1;
   }
 }
 
@@ -255,7 +256,12 @@ function offer(scene, links) {
   if (scene.links === links) return { text: scene.expected, act: () => runScene(scene) };
   if (scene.links === 0) return { text: scene.expected, act: null };
   return isAlone ? { text: `Click for an arm of ${scene.links} links.`, act: () => chooseLinks(scene.links) }
-    : { text: `Needs ${scene.links} links: start pendularm with --links ${scene.links}.`, act: null };
+    : { text: needed(scene.links), act: null };
+}
+
+/** How a server gets an arm with another number of links. The option has no line break. @param {number} links */
+export function needed(links) {
+  return `Needs ${links} links: start pendularm with -\u2060-\u2060links\u00a0${links}.`;
 }
 
 async function runScene(scene) {

@@ -80,7 +80,7 @@ function describe(about) {
 function inWords(best) {
   const controlled = found.some(({ sampling }) => sampling !== null);
   const meaning = controlled ? " Solid lines: error of the method. Dashed lines: error of the controller’s hold, which no method reduces. The table shows both errors [rad]: method + hold." : " The table shows the errors [rad].";
-  if (best.length === 0) return `No run came within ${WANTED} rad of the exact motion.${meaning}`;
+  if (best.length === 0) return `No run ${controlled ? "keeps both errors" : "came"} within ${WANTED} rad${controlled ? "" : " of the exact motion"}.${meaning}`;
   const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
   const uncertainty = uncertaintyOf(found);
   return `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} of run time, at a timestep of ${duration(cheap.timestep)}.${meaning}`

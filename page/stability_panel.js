@@ -86,7 +86,7 @@ function describeMap() {
   if (!row || !state.integrator) return;
   setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
   setText(byId("map-text"), `Solid line: limit of ${methodName(state.integrator.method)}, ${limitText(row.limit)} with these gains. Dashed line: limit of a controller without a hold, ${limitText(row.continuous)}. `
-    + `Higher gains need a smaller timestep; gains that are too low cannot hold the arm. The map is for a controller that acts at every step. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to change both.`);
+    + `Higher gains need a smaller timestep; gains that are too low cannot hold the arm. The map is for a controller that acts at every step. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to set gains and timestep.`);
 }
 
 function goTo(left, top) {
@@ -139,7 +139,7 @@ const push = latestOnly(async ({ loop, key }) => {
   if (key !== pushAsked || !found) return;
   heights = found;
   const outcome = isFree(loop.gains) ? "the push becomes a swing, which nothing damps"
-    : `the push ${shrinks(heights) ? "dies away" : "does not die away"} within ${LOOKS} ${steps > 1 ? "measurements" : "steps"}`;
+    : `the push ${shrinks(heights) ? "shrinks" : "does not shrink"} over ${LOOKS} ${steps > 1 ? "measurements" : "steps"}`;
   setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${steps > 1 ? "a control period of " : ""}${duration(steps * timestep)}: ${outcome}.`);
   bars.redraw();
 }, ASK_MS);

@@ -37,8 +37,9 @@ function startGoal() {
   showGoal(null);
 }
 
-/** Orientation and tolerance for the next goal. An empty field has the runtime's default. */
+/** Orientation and tolerance for the next goal. An empty field has the runtime's default, as have all in the course. */
 export function goalOptions() {
+  if (state.view === "course") return {};
   return {
     phi: state.links > 2 ? fields.phi.number() : undefined,
     epsilon: fields.epsilon.number(),

@@ -35,7 +35,7 @@ def take():
         page.click("#tab-stability")
         page.until("/^stable$/m.test(document.body.innerText)", why="the limit is known")
         page.until("/The dot is the arm\\./.test(document.querySelector('#stability').innerText)", why="the controller is on")
-        page.until("document.querySelector('#push-text').textContent.includes('dies away')", why="the push")
+        page.until("document.querySelector('#push-text').textContent.includes('push shrinks')", why="the push")
         # The map is refined over time. It is complete once it has not changed for two seconds.
         page.run("""(() => { let last = '', since = 0; window.rests = () => {
             const now = [...document.querySelectorAll('#stability canvas')].map((one) => one.toDataURL()).join();

@@ -23,7 +23,7 @@ pub(crate) struct Counts {
     pub(crate) window: Window,
     /// Wall time by which the arm was late after the latest wake-up \[s\].
     pub(crate) behind: f64,
-    /// Rates over the previous window, for a message early in the present one.
+    /// Rates over the last window in which the arm moved, for a message early in the present one.
     pub(crate) last_rates: Rates,
 }
 
@@ -91,6 +91,23 @@ impl Counts {
         if took > self.window.longest.took {
             self.window.longest = WakeUp { steps, took };
         }
+    }
+
+    /// Rates count from here, as after a pause.
+    pub(crate) fn restart_window(&mut self, now: Duration) {
+        let longest = self.window.longest;
+        self.window = Window {
+            longest,
+            ..Window::new(now)
+        };
+    }
+
+    /// Begins the next window. Keeps the rates of this one, unless the arm `stands`.
+    pub(crate) fn end_window(&mut self, now: Duration, stands: bool) {
+        if let Some(rates) = self.window.rates(now).filter(|_| !stands) {
+            self.last_rates = rates;
+        }
+        self.window = Window::new(now);
     }
 
     /// Whether the arm is so late that it will soon drop steps, or drops them already.

@@ -147,7 +147,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     /// Takes due steps within one wake-up's budget. Returns `true` if steps remain: the caller then calls
     /// [`LiveArm::catch_up`] after a [`STEP_PAUSE`].
     pub fn advance_to_now(&mut self) -> bool {
-        if self.paused || self.simulation.divergence().is_some() {
+        if self.stands() {
             return false;
         }
         // There is one budget until the pause is over. With one per message, a client with many messages could block
@@ -170,6 +170,11 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         let behind = self.catching_up.then(|| self.pacer.behind(now));
         self.counts.behind = behind.unwrap_or_default();
         self.catching_up
+    }
+
+    /// Whether no step is due: the arm is paused or has diverged.
+    pub(crate) fn stands(&self) -> bool {
+        self.paused || self.simulation.divergence().is_some()
     }
 
     /// Takes the remaining steps after the pause. Returns the same as [`LiveArm::advance_to_now`].

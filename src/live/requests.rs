@@ -168,7 +168,7 @@ impl<const N: usize> ArmRequest<N> for Reset<N> {
             arm.restart_pacer();
             arm.restart_energy_drift();
             if diverged {
-                arm.publish_diagnostics();
+                arm.publish_new_state();
             }
         }
         Echo {
@@ -195,7 +195,7 @@ impl<const N: usize> ArmRequest<N> for SetState<N> {
             if had_diverged {
                 // Simulation time did not pass meanwhile.
                 arm.restart_pacer();
-                arm.publish_diagnostics();
+                arm.publish_new_state();
             }
         }
         Echo {
@@ -215,7 +215,7 @@ impl<const N: usize> ArmRequest<N> for Pause {
         if let Some(paused) = self.paused.filter(|&paused| paused != present) {
             arm.paused = paused;
             arm.restart_pacer();
-            arm.publish_diagnostics();
+            arm.publish_new_state();
         }
         Echo {
             values: arm.paused,

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use super::counts::{WakeUp, Window, energy};
+use super::counts::{WakeUp, energy};
 use super::{LiveArm, Obstacle, PUBLISH_RATE, World};
 use crate::math::arm::State;
 use crate::math::pacer::CATCH_UP;
@@ -46,10 +46,14 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
         if self.counts.ticks.is_multiple_of(u64::from(PUBLISH_RATE)) {
             self.publish_diagnostics();
-            let now = self.world.now();
-            self.counts.last_rates = self.counts.window.rates(now).unwrap_or_default();
-            self.counts.window = Window::new(now);
+            self.counts.end_window(self.world.now(), self.stands());
         }
+    }
+
+    /// Publishes that the arm has begun or ceased to move. Rates count from here.
+    pub(super) fn publish_new_state(&mut self) {
+        self.counts.restart_window(self.world.now());
+        self.publish_diagnostics();
     }
 
     /// Publishes `/diagnostics`, if it has subscribers.

@@ -7,18 +7,19 @@ from stage import PageTest, needs_server
 @needs_server("no server, no connection that others could have or lose")
 class Reconnecting(PageTest):
     def test_a_lost_connection_is_reported_everywhere_and_comes_back(self):
-        self.runtime.call("/arm_sim/set_params", gravity=4)
-        self.page.until("document.querySelector('#gravity-field input[type=number]').value === '4'")
+        self.page.fill("#gravity-field input[type=number]", "4")
+        self.page.until("!document.querySelector('#undo').disabled")
         self.page.until("!document.querySelector('#verdict-pill').hidden")
         self.tab("compare")
         self.page.expect_network_errors = True  # the browser itself reports refused connections
         self.runtime.stop()
         self.page.until("document.querySelector('#notice').textContent.startsWith('Connection lost')")
-        self.assertTrue(self.page.run("document.querySelector('#course-start').disabled"))
         self.assertIn("The connection is lost", self.page.text("#course-status"))
+        self.page.click("#defaults")
         # The timestep has no verdict, and what is typed or pressed is refused.
         self.page.until("document.querySelector('#run-state').textContent === 'no connection'")
-        self.assertEqual(self.page.run("[document.querySelector('#verdict-pill').hidden, document.querySelector('#verdict').textContent]"), [True, ""])
+        self.assertEqual(self.page.run("[document.querySelector('#verdict').textContent, document.querySelector('#verdict-pill').hidden, document.querySelector('#undo').disabled, document.querySelector('#course-start').disabled]"), ["", True, True, True])
+        self.assertNotIn("defaults", self.page.text("#announce-polite"), "nothing was set")
         self.page.until("document.querySelector('#out-rtf').textContent.startsWith('–')")
         for field, typed in (("#setpoint-fields", "1"), ("#timestep-field", "2")):
             self.page.fill(f"{field} input[type=number]", typed)
@@ -31,9 +32,8 @@ class Reconnecting(PageTest):
         self.assertEqual(self.page.run(f"{refused}.length"), 3)
         self.runtime.start()
         self.connected()
-        self.page.until(f"{refused}.length === 0")
         self.page.until("document.querySelector('#gravity-field input[type=number]').value === '9.81'", why="the new runtime's gravity")
-        self.page.until("document.querySelector('#notice').hidden")
+        self.page.until(f"document.querySelector('#notice').hidden && {refused}.length === 0")
         self.page.click("#controller")
         self.wait(lambda: self.runtime.call("/pid_controller/enable")["values"]["data"], "the controller")
 

@@ -7,8 +7,8 @@ from stage import PageTest
 
 AXE = pathlib.Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 PANELS = ("plots", "stability", "error", "compare", "tasks")
-# Captions in sight that are not whole.
-CLIPPED = """[...document.querySelectorAll('figcaption')].filter((one) => one.checkVisibility()
+# Captions and figures in sight that are not whole.
+CLIPPED = """[...document.querySelectorAll('figcaption, figure')].filter((one) => one.checkVisibility()
     && (one.scrollWidth > one.clientWidth || one.scrollHeight > one.clientHeight)).map((one) => one.textContent)"""
 # Pairs of readouts whose texts overlap.
 OVERLAPS = """(() => {

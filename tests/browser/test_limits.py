@@ -67,15 +67,15 @@ class BlowUp(PageTest):
         self.tab("stability")
         self.page.until("document.querySelector('#push-text').textContent.includes('a swing, which nothing damps')")
         self.page.click("#controller")
-        self.page.until("document.querySelector('#push-text').textContent.includes('at 1 ms: the push dies away')")
+        self.page.until("document.querySelector('#push-text').textContent.includes('at 1 ms: the push shrinks')")
         self.page.fill(f"#timestep-field {NUMBER}", "6")
-        self.page.until("document.querySelector('#push-text').textContent.includes('at 6 ms: the push does not die away')")
+        self.page.until("document.querySelector('#push-text').textContent.includes('at 6 ms: the push does not shrink')")
         picture = self.image("#push-bars")
         self.assertGreater(picture.count(self.color("bad")), 200)
         self.assertGreater(picture.count(self.color("accent")), 200)
         self.runtime.call("/pid_controller/set_period", period=0.006)
         self.page.fill(f"#timestep-field {NUMBER}", "0.5")
-        self.page.until("document.querySelector('#push-text').textContent.includes('a control period of 6 ms: the push does not die away')")
+        self.page.until("document.querySelector('#push-text').textContent.includes('a control period of 6 ms: the push does not shrink')")
 
     def test_error_against_run_time_is_measured_live(self):
         self.tab("error")

@@ -31,7 +31,7 @@ fn the_papers_list_the_keys_of_diagnostics() {
     let exchanges = text("tests/actors/exchanges/arm.txt");
     let sent = exchanges
         .lines()
-        .find(|line| line.contains("\"key\":\"sim_time\""));
+        .find(|line| line.contains("\"key\":\"warning\""));
     let sent = sent.unwrap().split("{\"key\":\"").skip(1);
     let sent: Vec<&str> = sent.filter_map(|one| one.split('"').next()).collect();
     let rows = table(&text("docs/protocol.md"), "status");
