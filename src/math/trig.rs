@@ -1,6 +1,6 @@
 //! Sine and cosine of all joint angles of an arm at once. They are half of the cost of its dynamics.
 //!
-//! Every stage is done for all angles before the next begins, so that the compiler can put two of them into one
+//! Almost every stage is done for all angles before the next begins, so that the compiler can put two of them into one
 //! register. There is no branch on the angle, except for arms that have turned more than 30,000 times. Every
 //! platform executes the same operations in the same order. Results do not depend on the platform's libm.
 //!
@@ -27,7 +27,7 @@ use std::f64::consts::FRAC_2_PI;
 use super::number::{Number, entries};
 
 /// Largest magnitude of an angle \[rad\] for which the reduction is exact. Beyond it `k` would need more than 17 bits.
-const LIMIT: f64 = 2.0e5;
+pub(super) const LIMIT: f64 = 2.0e5;
 
 /// Adding this rounds to an integer, which is then in the low bits of the sum: `1.5 * 2^52`.
 const ROUND: f64 = 6_755_399_441_055_744.0;
@@ -63,7 +63,21 @@ const C: [f64; 6] = [
 #[must_use]
 #[inline(always)]
 pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
+    let (mut sin, mut cos) = sin_cos_within(angles);
+    if !T::all_within(angles, LIMIT) {
+        // The entries are passed one by one. Otherwise this rare call would force the arrays into memory.
+        let (any, replaced) = (angles[0], replaced_far(*angles, sin, cos));
+        sin = entries!(any, i => replaced.0[i]);
+        cos = entries!(any, i => replaced.1[i]);
+    }
+    (sin, cos)
+}
+
+/// Sines and cosines of angles within [`LIMIT`]. The last angle is first, because an arm's dynamics begin at its tip.
+#[inline(always)]
+pub(super) fn sin_cos_within<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
     let any = angles[0];
+    let angles = entries!(any, i => angles[N - 1 - i]);
     let shifted = entries!(any, i => angles[i] * FRAC_2_PI + ROUND);
     let k = entries!(any, i => shifted[i] + -ROUND);
     let first = entries!(any, i => angles[i].sub_exact_product(k[i], HALF_PI[0]));
@@ -77,32 +91,41 @@ pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
     let r4 = entries!(any, i => r2[i] * r2[i]);
     // Terms of low degree are added while those of high degree are still multiplied, so few sums wait for the last
     // product.
-    let s = entries!(any, i => upper(S, r2[i], r4[i]));
     let c = entries!(any, i => upper(C, r2[i], r4[i]));
+    let s = entries!(any, i => upper(S, r2[i], r4[i]));
     let r3 = entries!(any, i => r[i] * r2[i]);
-    let sine = entries!(any, i => {
-        let low = tail[i] + r3[i] * (r2[i] * S[1] + S[0]);
-        r[i] + (low + r3[i] * r4[i] * s[i])
-    });
-    let cosine = entries!(any, i => {
-        let one = any.like(1.0);
-        let half = r2[i] * 0.5;
-        let head = one - half;
-        let low = r4[i] * (r2[i] * C[1] + C[0]) - r[i] * tail[i];
-        head + ((((one - head) - half) + low) + r4[i] * r4[i] * c[i])
-    });
-
-    let (mut sin, mut cos) = (sine, cosine);
-    for i in 0..N {
-        (sin[i], cos[i]) = shifted[i].turned(sine[i], cosine[i]);
-    }
-    if !T::all_within(angles, LIMIT) {
-        // The entries are passed one by one. Otherwise this rare call would force the arrays into memory.
-        let replaced = replaced_far(*angles, sin, cos);
-        sin = entries!(any, i => replaced.0[i]);
-        cos = entries!(any, i => replaced.1[i]);
+    let (mut sin, mut cos) = (s, c);
+    if T::LANES == 1 {
+        // The compiler puts single numbers into one register only if all stages are done for all angles.
+        let sine = entries!(any, i => sine(r[i], tail[i], [r2[i], r3[i], r4[i]], s[i]));
+        let cosine = entries!(any, i => cosine(r[i], tail[i], [r2[i], r4[i]], c[i]));
+        for i in 0..N {
+            (sin[N - 1 - i], cos[N - 1 - i]) = shifted[i].turned(sine[i], cosine[i]);
+        }
+    } else {
+        // Angle by angle, fewer operations wait in the processor's scheduler for earlier ones.
+        for i in 0..N {
+            let sine = sine(r[i], tail[i], [r2[i], r3[i], r4[i]], s[i]);
+            let cosine = cosine(r[i], tail[i], [r2[i], r4[i]], c[i]);
+            (sin[N - 1 - i], cos[N - 1 - i]) = shifted[i].turned(sine, cosine);
+        }
     }
     (sin, cos)
+}
+
+#[inline(always)]
+fn sine<T: Number>(r: T, tail: T, [r2, r3, r4]: [T; 3], upper: T) -> T {
+    let low = tail + r3 * (r2 * S[1] + S[0]);
+    r + (low + r3 * r4 * upper)
+}
+
+#[inline(always)]
+fn cosine<T: Number>(r: T, tail: T, [r2, r4]: [T; 2], upper: T) -> T {
+    let one = r.like(1.0);
+    let half = r2 * 0.5;
+    let head = one - half;
+    let low = r4 * (r2 * C[1] + C[0]) - r * tail;
+    head + ((((one - head) - half) + low) + r4 * r4 * upper)
 }
 
 /// The terms of `p` from the third on, over the second power of its variable, which is `r2`.

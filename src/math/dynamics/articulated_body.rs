@@ -59,7 +59,9 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const HAS_GRAVITY: b
     let (sin, cos) = if HAS_GRAVITY {
         trig::sin_cos(q)
     } else {
-        sin_cos_beyond_first(q)
+        // The first angle counts as 0, and the compiler evaluates its sine and cosine itself.
+        let zero = q[0].like(0.0);
+        trig::sin_cos(&entries!(zero, i => if i > 0 { q[i] } else { zero }))
     };
     recursion_along::<T, N, HAS_GRAVITY>(rods, gravity, (&sin, &cos), qd, tau)
 }
@@ -134,20 +136,6 @@ pub(super) fn recursion_along<T: Number, const N: usize, const HAS_GRAVITY: bool
         }
     }
     relative
-}
-
-/// Sines and cosines of all angles except the first, which counts as 0.
-#[inline(always)]
-fn sin_cos_beyond_first<T: Number, const N: usize>(q: &[T; N]) -> ([T; N], [T; N]) {
-    // The constant is last, so the compiler evaluates its sine and cosine itself and finds the other angles side by
-    // side. If it is first, a step of 3 links takes fewer instructions but 1.5 times as long.
-    let zero = q[0].like(0.0);
-    let beyond = entries!(zero, i => if i + 1 < N { q[i + 1] } else { zero });
-    let (sin, cos) = trig::sin_cos(&beyond);
-    (
-        entries!(zero, i => sin[(i + N - 1) % N]),
-        entries!(zero, i => cos[(i + N - 1) % N]),
-    )
 }
 
 /// A vector in the plane.

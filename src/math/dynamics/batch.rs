@@ -11,9 +11,10 @@
 
 use fearless_simd::{Simd, SimdBase, dispatch};
 
-use super::recursion;
+use super::articulated_body::recursion_along;
 use crate::math::arm::{Arm, Rod};
 use crate::math::number::{Arithmetic, Number, Registers, Wide, entries};
+use crate::math::trig;
 
 /// One column per joint. Entry `k` of each column belongs to state `k`.
 pub type Columns<'a, const N: usize> = [&'a [f64]; N];
@@ -35,7 +36,10 @@ impl Registers {
         let given = given.map(|columns| columns.map(|column| &column[..count]));
         let mut qdd = qdd.each_mut().map(|column| &mut column[..count]);
         if count < 2 * self.lanes() {
-            alone(arm, given, &mut qdd, count);
+            let [q, qd, tau] = given;
+            for at in 0..count {
+                alone(arm, q.map(|column| column[at]), [qd, tau], &mut qdd, at);
+            }
         } else {
             dispatch!(self.level(), simd => in_registers(simd, arm, given, &mut qdd, count));
         }
@@ -71,18 +75,23 @@ pub fn forward_dynamics<const N: usize>(
     Registers::widest().forward_dynamics(arm, q, qd, tau, qdd);
 }
 
-/// If there are too few states to fill the registers, they are computed one by one.
-fn alone<const N: usize>(
+/// Computes the states in the lanes of `q` one by one. They are too few to fill the registers, or an angle is beyond the
+/// limit of the sines. Because `q` is passed by value, the compiler aligns the caller's stack, so no register is stored
+/// across two cache lines.
+#[inline(never)]
+fn alone<T: Number, const N: usize>(
     arm: &Arm<N>,
-    given: [Columns<'_, N>; 3],
+    q: [T; N],
+    given: [Columns<'_, N>; 2],
     qdd: &mut [&mut [f64]; N],
-    count: usize,
+    at: usize,
 ) {
-    for at in 0..count {
-        let [q, qd, tau] = given.map(|columns| columns.map(|column| column[at]));
+    for lane in 0..T::LANES {
+        let q = entries!(0.0, i => q[i].lane(lane));
+        let [qd, tau] = given.map(|columns| columns.map(|column| column[at + lane]));
         let accelerations = super::forward_dynamics(arm, &q, &qd, &tau);
         for (column, acceleration) in qdd.iter_mut().zip(accelerations) {
-            column[at] = acceleration;
+            column[at + lane] = acceleration;
         }
     }
 }
@@ -117,7 +126,7 @@ fn together<S: Simd, const K: usize, const N: usize>(
     let lanes = Wide::<S, K>::LANES;
     // One length for all columns, so that it is compared once and not for every load.
     let [q, qd, tau] = [q, qd, tau].map(|columns| columns.map(|column| &column[..count]));
-    let qdd = qdd.each_mut().map(|column| &mut column[..count]);
+    let mut qdd = qdd.each_mut().map(|column| &mut column[..count]);
     let zero = Wide::<S, K>::splat(simd, 0.0);
     let gravity = zero.like(arm.gravity);
     let rods = entries!(in_lanes(&arm.rods[0], zero), i => in_lanes(&arm.rods[i], zero));
@@ -125,13 +134,19 @@ fn together<S: Simd, const K: usize, const N: usize>(
     while next < count {
         let at = next.min(count - lanes);
         let q = entries!(zero, i => Wide::<S, K>::load(simd, &q[i][at..]));
+        next += lanes;
+        // Angles are checked first. Then sines and recursion are one block, and the compiler can mix their operations.
+        if !Wide::all_within(&q, trig::LIMIT) {
+            alone(arm, q, [qd, tau], &mut qdd, at);
+            continue;
+        }
+        let (sin, cos) = trig::sin_cos_within(&q);
         let qd = entries!(zero, i => Wide::<S, K>::load(simd, &qd[i][at..]));
         let tau = entries!(zero, i => Wide::<S, K>::load(simd, &tau[i][at..]));
-        let accelerations = recursion::<Wide<S, K>, N, true>(&rods, &gravity, &q, &qd, &tau);
+        let accelerations = recursion_along::<_, N, true>(&rods, &gravity, (&sin, &cos), &qd, &tau);
         for i in 0..N {
             accelerations[i].store(&mut qdd[i][at..]);
         }
-        next += lanes;
     }
 }
 
