@@ -256,12 +256,13 @@ function offer(scene, links) {
   if (scene.links === links) return { text: scene.expected, act: () => runScene(scene) };
   if (scene.links === 0) return { text: scene.expected, act: null };
   return isAlone ? { text: `Click for an arm of ${scene.links} links.`, act: () => chooseLinks(scene.links) }
-    : { text: needed(scene.links), act: null };
+    // Without line breaks in the option. Nobody copies these characters, because the text of a button cannot be selected.
+    : { text: needed(scene.links).replace("--links ", "-\u2060-\u2060links\u00a0"), act: null };
 }
 
-/** How a server gets an arm with another number of links. The option has no line break. @param {number} links */
+/** How a server gets an arm with another number of links. @param {number} links */
 export function needed(links) {
-  return `Needs ${links} links: start pendularm with -\u2060-\u2060links\u00a0${links}.`;
+  return `Needs ${links} links: start pendularm with --links ${links}.`;
 }
 
 async function runScene(scene) {
