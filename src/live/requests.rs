@@ -215,7 +215,11 @@ impl<const N: usize> ArmRequest<N> for Pause {
         if let Some(paused) = self.paused.filter(|&paused| paused != present) {
             arm.paused = paused;
             arm.restart_pacer();
-            arm.publish_new_state();
+            if paused {
+                arm.publish_diagnostics();
+            } else {
+                arm.publish_new_state();
+            }
         }
         Echo {
             values: arm.paused,

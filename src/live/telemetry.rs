@@ -50,7 +50,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// Publishes that the arm has begun or ceased to move. Rates count from here.
+    /// Publishes that the arm may move again. Rates count from here.
     pub(super) fn publish_new_state(&mut self) {
         self.counts.restart_window(self.world.now());
         self.publish_diagnostics();
