@@ -75,9 +75,9 @@ export const STEPS = [
     scene: (links) => controlled(links, BEYOND[links]),
     offset: [0, 0.02, 0], paused: true,
     chart: "bars", dial: "period",
-    task: { text: "Shorten the period until the bars shrink.", done: ({ shrinks }) => shrinks },
+    task: { text: "Shorten the period until the bars shrink.", done: ({ shrinks, stable }) => shrinks && stable },
     question: {
-      text: "Beyond the limit each bar points the other way. Why?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
+      text: "At the first period the last bars pointed up and down in turn. Why?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
       because: "The torque is held too long. It pushes the joint past the target. Beyond the limit each push goes further than the one before.",
     },
   },
@@ -108,7 +108,7 @@ export const STEPS = [
     text: "More damping or less mass makes the arm react faster: the controller must measure more often. The limit is about T = 2 λmin(Kd⁻¹ M). M is the mass matrix, Kd the damping, λmin the smallest eigenvalue.",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "map", dial: "damping",
-    task: { text: "Change the damping or the mass until this period is stable.", done: ({ stable }) => stable },
+    task: { text: "Change damping and mass until this period is stable.", done: ({ stable }) => stable },
     question: {
       text: "You halve the damping. What does the limit do?", answers: ["It halves", "It doubles", "It stays"], right: 1,
       because: "In the formula the damping is in the denominator: half of it gives twice the time. With far too little damping no period is stable.",
@@ -127,7 +127,7 @@ export const STEPS = [
   },
   {
     id: "price", title: "The price of accuracy",
-    text: "Each dot is one run, with its error and its run time. Solid lines show the error of the method. Dashed lines show the error of the hold. A cross marks a run that diverged.",
+    text: "Each dot is one run, with its error and its run time. Solid lines show the error of the method. Dashed lines show the distance from a controller without a hold. A cross marks a run that diverged.",
     scene: (links) => controlled(links, WITHIN[links]),
     chart: "ladder", dial: null,
     task: { text: "Measure the four methods.", done: ({ measured }) => measured },

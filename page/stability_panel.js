@@ -138,7 +138,7 @@ const push = latestOnly(async ({ loop, key }) => {
   const found = await deviation({ setpoint: rest, ...loop, integrator, timestep }, rest, steps * timestep);
   if (key !== pushAsked || !found) return;
   heights = found;
-  const outcome = isFree(loop.gains) ? "the push becomes a swing, which nothing damps"
+  const outcome = isFree(loop.gains) ? "nothing damps the push"
     : `the push ${shrinks(heights) ? "shrinks" : "does not shrink"} over ${LOOKS} ${steps > 1 ? "measurements" : "steps"}`;
   setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${steps > 1 ? "a control period of " : ""}${duration(steps * timestep)}: ${outcome}.`);
   bars.redraw();

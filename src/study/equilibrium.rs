@@ -53,8 +53,8 @@ pub struct Equilibrium<const N: usize> {
     pub balanced: bool,
 }
 
-/// The equilibrium that the arm reaches from the setpoint. It is the setpoint if every joint has an integral, and the
-/// sagging pose otherwise. A free arm hangs. An integral that would exceed its limit counts as an effort at the limit.
+/// The equilibrium below the setpoint, down the slope of the potential. It is the setpoint if every joint has an integral,
+/// and a sagging pose otherwise. A free arm hangs. An integral that would exceed its limit counts as an effort at it.
 pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     let (gains, setpoint) = (&control.gains, &control.setpoint);
     if control.is_free() {
