@@ -109,7 +109,7 @@ fn command() -> Command {
 
 /// Host and port.
 fn read_address(text: &str) -> Result<String, &'static str> {
-    address::read(text).ok_or("it must be a port, a host, both or a URL without TLS")
+    address::read_url(text).ok_or("it must be a port, a host, both or a URL without TLS")
 }
 
 /// A valid ROS 2 namespace with a leading slash.
