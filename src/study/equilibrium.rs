@@ -119,9 +119,8 @@ impl<const N: usize> Descent<'_, N> {
         gains.kd[i] * rate + saturated * gains.ki[i] * self.integral[i]
     }
 
-    /// Joints at the setpoint, held by an integral.
-    fn fixed(&self, sag: &[f64; N]) -> [bool; N] {
-        let gradient = self.gradient(sag);
+    /// Joints at the setpoint, held by an integral. `gradient` is that at this sag.
+    fn fixed(&self, sag: &[f64; N], gradient: &[f64; N]) -> [bool; N] {
         let is_back = |i: usize| sag[i] == 0.0 && self.integral[i] * gradient[i] < 0.0;
         std::array::from_fn(|i| self.integrating[i] || is_back(i))
     }
@@ -139,7 +138,8 @@ impl<const N: usize> Descent<'_, N> {
 
     /// The gradient of the joints that move; zero for the others.
     fn slopes(&self, sag: &[f64; N]) -> [f64; N] {
-        let (gradient, fixed) = (self.gradient(sag), self.fixed(sag));
+        let gradient = self.gradient(sag);
+        let fixed = self.fixed(sag, &gradient);
         std::array::from_fn(|i| if fixed[i] { 0.0 } else { gradient[i] })
     }
 
@@ -211,7 +211,7 @@ impl<const N: usize> Descent<'_, N> {
     /// `∂²V/∂y²` \[N m/rad\] of the joints that move; the others are decoupled, with 1 on the diagonal.
     fn stiffness(&self, sag: &[f64; N]) -> Matrix {
         let gradient = gravity_gradient(&self.control.arm, &self.position(sag));
-        let fixed = self.fixed(sag);
+        let fixed = self.fixed(sag, &self.gradient(sag));
         Matrix::from_fn(N, |i, j| {
             let same = f64::from(u8::from(i == j));
             if fixed[i] || fixed[j] {
