@@ -10,6 +10,12 @@ export const isAlone = carried !== null;
 /** Numbers of links allowed in the address. The default is two. */
 const LINKS = /(?:^|[?#&])links=([23])(?:&|$)/;
 
+/** @param {string} part of an address @returns {number | null} its number of links */
+export function linksIn(part) {
+  const found = LINKS.exec(part);
+  return found && Number(found[1]);
+}
+
 /** @param {string} text base64 of gzip */
 export async function unpack(text) {
   const packed = Uint8Array.from(atob(text), (one) => one.charCodeAt(0));
@@ -96,7 +102,7 @@ export class Kernel {
 
   async begin() {
     const bytes = await unpack(carried?.textContent ?? "");
-    const links = Number(LINKS.exec(location.search)?.[1] ?? LINKS.exec(location.hash)?.[1] ?? 2);
+    const links = linksIn(location.search) ?? linksIn(location.hash) ?? 2;
     const start = { bytes, links, seed: Math.random() };
     try {
       await this.beginWorker(start);

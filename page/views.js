@@ -7,7 +7,7 @@ import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
 import { chooseLinks, followLink, needed, stepInLink } from "./course_view.js";
 import { announce, byId, el, passFocus, setAddress, setText } from "./dom.js";
-import { isAlone } from "./kernel.js";
+import { isAlone, linksIn } from "./kernel.js";
 import { fromFragment, presentSettings, toFragment } from "./settings.js";
 import { set, state, watch } from "./store.js";
 
@@ -131,7 +131,7 @@ function offer() {
   banner.replaceChildren(
     el("p", {}, "This link has settings: ", el("span", { class: "offer-text" }, text)),
     el("button", { type: "button", class: "primary", onclick: async () => {
-      const links = /^[23]$/.test(given.get("links") ?? "") ? Number(given.get("links")) : state.links;
+      const links = linksIn(location.hash) ?? state.links;
       if (links !== state.links && isAlone) return chooseLinks(links, location.hash);
       remember();
       const refused = links !== state.links ? needed(links) : await apply(settings);
