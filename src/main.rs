@@ -3,7 +3,7 @@
 //! **Invariant:** nothing here panics, even if standard output or standard error is closed, full or
 //! broken.
 
-use std::ffi::{OsStr, OsString};
+use std::ffi::OsString;
 #[cfg(feature = "record")]
 use std::fs::File;
 #[cfg(feature = "record")]
@@ -118,11 +118,13 @@ fn replay(path: &Path) -> ExitCode {
 
 /// Warns of misspelled variables, such as `ARM_SIM_LINK`.
 fn warn_of_unknown_variables() {
-    let server = Options::augment_args(Command::new("server"));
-    let known: Vec<&OsStr> = server.get_arguments().filter_map(Arg::get_env).collect();
+    let is_ours = |name: &OsString| name.to_string_lossy().starts_with("ARM_SIM_");
     let names = std::env::vars_os().map(|(name, _)| name);
-    let mut unknown: Vec<OsString> = names.filter(|name| !known.contains(&&**name)).collect();
-    unknown.retain(|name| name.to_string_lossy().starts_with("ARM_SIM_"));
+    let mut unknown: Vec<OsString> = names.filter(is_ours).collect();
+    let server = Options::augment_args(Command::new("server"));
+    for known in server.get_arguments().filter_map(Arg::get_env) {
+        unknown.retain(|name| name != known);
+    }
     if !unknown.is_empty() {
         tracing::warn!(?unknown, "variables without effect; --help lists all");
     }

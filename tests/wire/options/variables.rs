@@ -69,6 +69,11 @@ fn every_variable_is_taken_and_a_wrong_one_is_refused_by_name_and_value() {
     }
     let short = refusal(&[], &[("ARM_SIM_TOKEN", "a-Secret")]);
     assert_eq!(short, "ARM_SIM_TOKEN must have 16 to 256 characters, got 8");
+    let reachable = refusal(&[], &[("ARM_SIM_BIND", "0.0.0.0:0")]);
+    assert!(
+        reachable.starts_with("--bind (ARM_SIM_BIND) must be a loopback address"),
+        "{reachable}"
+    );
 }
 
 #[test]
