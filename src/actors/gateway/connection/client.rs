@@ -9,7 +9,7 @@
 //! break. One poll writes a bounded number of bytes.
 
 use std::collections::VecDeque;
-use std::pin::Pin;
+use std::pin::{Pin, pin};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::task::{self, Poll, ready};
@@ -17,11 +17,11 @@ use std::task::{self, Poll, ready};
 use actix::prelude::*;
 use bytes::Bytes;
 use tokio::sync::Notify;
+use tokio::task::yield_now;
 use tokio::time::{Instant, Sleep, sleep_until};
 
 use super::flow::{Ends, FRESH, FlowControl, UnreadSource};
 use super::transport::{ClientLost, ClientStream, Transport};
-use super::turns::Turns;
 use crate::actors::gateway::limits::{
     LINGER, MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES,
 };
@@ -308,7 +308,6 @@ impl<S: ClientStream> Connection<S> {
 #[derive(Default)]
 pub(super) struct ClientWriter {
     timer: Timer,
-    turns: Turns,
     /// Deadline of the end of the stream.
     end_due: Option<Instant>,
     /// Deadline of the reader, which continues after all messages were written.
@@ -361,8 +360,7 @@ impl ClientWriter {
                         let may_read = client.note_written(bytes);
                         written += bytes;
                         if written >= WRITE_BYTES / 2 {
-                            self.turns.end(cx);
-                            return Poll::Pending;
+                            return end_turn(cx);
                         }
                         if may_read {
                             cx.waker().wake_by_ref();
@@ -380,7 +378,6 @@ impl ClientWriter {
                 if is_gone || client.is_stuck() {
                     return Poll::Ready(false);
                 }
-                self.turns.rest();
                 (None, client.next_release())
             };
             ready!(self.timer.poll(deadline.or(release), cx));
@@ -404,6 +401,13 @@ impl ClientWriter {
         let due = *self.end_due.get_or_insert_with(|| Instant::now() + LINGER);
         self.timer.poll(Some(due), cx).map(|()| false)
     }
+}
+
+/// Ends the turn of a task that has more to do. It is polled again after every other task that is ready, and after the
+/// sockets.
+pub(super) fn end_turn<T>(cx: &mut task::Context<'_>) -> Poll<T> {
+    let _ = pin!(yield_now()).poll(cx);
+    Poll::Pending
 }
 
 /// A timer whose deadline may change.

@@ -20,7 +20,6 @@ mod session;
     allow(dead_code, reason = "only an HTTP request opens a WebSocket")
 )]
 mod transport;
-mod turns;
 
 use std::future::ready;
 use std::pin::Pin;

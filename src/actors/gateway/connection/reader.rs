@@ -16,17 +16,16 @@ use bytes::BytesMut;
 use tokio::time::error::Elapsed;
 use tokio::time::{Instant, sleep, timeout};
 
-use super::client::{Connection, Timer};
+use super::client::{Connection, Timer, end_turn};
 use super::flow::{Ends, has_closed};
 use super::session::HeldPlace;
 use super::transport::{ClientLost, ClientStream};
-use super::turns::Turns;
 use crate::actors::gateway::limits::{
     CLOSED_CHECK, DISCARD_BYTES, FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, READ_BYTES,
     RESPONSES_TIME,
 };
 use crate::actors::gateway::registry::{Disconnect, Handled, Request, Retire};
-use crate::actors::resources::long_work::{WorkKind, run_long_work};
+use crate::actors::resources::long_work::{SHORT_WORK, WorkKind, run_long_work};
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
 use crate::protocol::catalog::Service;
 use crate::protocol::limits::MEDIUM;
@@ -66,7 +65,6 @@ pub(super) struct ClientReader {
     /// Whether a JSON object has arrived. Then the client does not use HTTP, because a request has its head first.
     speaks_json: bool,
     timer: Timer,
-    turns: Turns,
     /// Bytes that this poll has given to the transport.
     bytes: usize,
     /// Frames that this poll has taken, and deliveries of their messages.
@@ -167,7 +165,6 @@ impl ClientReader {
             unread: None,
             speaks_json: false,
             timer: Timer::default(),
-            turns: Turns::default(),
             bytes: 0,
             ops: 0,
         }
@@ -181,8 +178,7 @@ impl ClientReader {
     ) -> Poll<Result<ReadStep, ClientLost>> {
         // All chunks of a long frame may be available at once.
         if self.bytes >= READ_BYTES / 2 {
-            self.turns.end(cx);
-            return Poll::Pending;
+            return end_turn(cx);
         }
         if self.chunk.is_empty() && !self.has_ended {
             ready!(self.poll_read(client, cx))?;
@@ -211,8 +207,7 @@ impl ClientReader {
             return Poll::Ready(Ok(self.retire(client)));
         }
         if self.ops >= FRAMES_IN_A_ROW {
-            self.turns.end(cx);
-            return Poll::Pending;
+            return end_turn(cx);
         }
         ready!(self.poll_may_read(client, cx))?;
         let transport = client.transport()?;
@@ -300,7 +295,6 @@ impl ClientReader {
             self.has_ended = read? == 0;
             return Poll::Ready(Ok(()));
         }
-        self.turns.rest();
         loop {
             let begin = || Instant::now() + FRAME_TIME;
             let is_unfinished = transport.is_unfinished();
@@ -417,7 +411,6 @@ async fn closed(ends: Ends) {
 #[derive(Default)]
 pub(super) struct Discarder {
     bytes: usize,
-    turns: Turns,
 }
 
 impl<S: ClientStream> ActorFuture<Connection<S>> for Discarder {
@@ -437,8 +430,7 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for Discarder {
         if read.unwrap_or(0) == 0 || self.bytes >= DISCARD_BYTES {
             return Poll::Ready(());
         }
-        self.turns.end(cx);
-        Poll::Pending
+        end_turn(cx)
     }
 }
 
@@ -521,7 +513,7 @@ async fn parse(
             Err((error, start)) => op::read_start(&start, &error),
         })
     };
-    if length <= SHORT {
+    if length <= SHORT_WORK {
         return Ok(parse());
     }
     let parsed = run_long_work(WorkKind::of(length), parse).await;

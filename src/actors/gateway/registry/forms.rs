@@ -11,16 +11,13 @@ use serde_json::value::RawValue;
 
 use super::Subscriber;
 use super::forwarded::own_id;
+use crate::actors::resources::long_work::SHORT_WORK;
 use crate::actors::resources::memory::{Permit, cover_message};
 use crate::protocol::messages;
 use crate::protocol::op::{Compression, Encoding};
 use crate::protocol::outbox::MAX_MESSAGE;
 use crate::protocol::ros::{cbor, stamps};
 use crate::protocol::wire::{fragments, series};
-
-/// Longest message, or series of messages, that is encoded on the registry's thread. Each form takes about a tenth of a
-/// millisecond.
-const ENCODED_HERE: usize = 16 * 1024;
 
 /// The messages in one form.
 #[derive(Default)]
@@ -56,7 +53,7 @@ impl ToEncode {
 
     /// Whether it is so long that a worker thread must encode it.
     pub(super) fn is_long(&self) -> bool {
-        self.plain.len() > ENCODED_HERE
+        self.plain.len() > SHORT_WORK
     }
 
     /// Makes the form.
