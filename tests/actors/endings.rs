@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE, turns_of_others};
+use pendularm::actors::gateway::limits::STALL_LIMIT;
 use pendularm::actors::gateway::registry::FinishAll;
 use serde_json::{Value, json};
 use tokio::io::AsyncWriteExt;
@@ -139,7 +140,7 @@ fn a_client_that_reads_nothing_is_not_read_when_the_runtime_ends() {
             let sent = timeout(Duration::from_secs(1), all).await;
             assert!(sent.is_err(), "{is_ending}: all of it was read");
         }
-        sleep(Duration::from_secs(10)).await;
+        sleep(STALL_LIMIT).await;
         assert_eq!(gateway.gauges.connections(), 0);
     });
 }

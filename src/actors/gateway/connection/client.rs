@@ -11,7 +11,7 @@
 use std::collections::VecDeque;
 use std::pin::{Pin, pin};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
@@ -21,11 +21,12 @@ use tokio::task::yield_now;
 use tokio::time::{Instant, Sleep, sleep_until};
 
 use super::flow::{Ends, FRESH, FlowControl, UnreadSource};
+use super::session::HeldPlace;
 use super::transport::{ClientLost, ClientStream, Transport};
 use crate::actors::gateway::limits::{
     LINGER, MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES,
 };
-use crate::actors::gateway::registry::{Registry, Request, ToClient};
+use crate::actors::gateway::registry::{Registry, Request, Retire, ToClient};
 use crate::actors::panics::{Contained, contain};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::SHORT;
@@ -39,6 +40,8 @@ use crate::protocol::outbox::{MAX_AGE, Outbox};
 pub struct Connection<S> {
     /// The stream, after the session has ended.
     pub(super) transport: Option<Transport<S>>,
+    /// The place of a served client. It is free once the actor and its output are gone.
+    pub(super) place: Option<HeldPlace>,
     pub(super) ends: Ends,
     pub(super) registry: Addr<Registry>,
     pub(super) gauges: Arc<Gauges>,
@@ -49,6 +52,8 @@ pub struct Connection<S> {
     pub(super) is_single: bool,
     /// Bytes of short responses in the outbox. The registry reads it.
     pub(super) backlog: Arc<AtomicUsize>,
+    /// Set when the client has left. The nodes read it.
+    pub(super) gone: Arc<AtomicBool>,
     /// Time when the frames being written left the outbox, or when the client last took bytes of them.
     pub(super) progress: Instant,
     /// Start of the time in which responses have waited without a break.
@@ -78,6 +83,7 @@ impl<S: ClientStream> Connection<S> {
         let now = Instant::now();
         Self {
             transport: None,
+            place: None,
             ends,
             registry,
             gauges,
@@ -85,6 +91,7 @@ impl<S: ClientStream> Connection<S> {
             flow: FlowControl::new(unread, now),
             is_single: false,
             backlog: Arc::default(),
+            gone: Arc::default(),
             progress: now,
             responses_since: None,
             computations: VecDeque::new(),
@@ -271,10 +278,15 @@ impl<S: ClientStream> Connection<S> {
         self.is_running || !self.computations.is_empty()
     }
 
-    /// Drops the computations: the client no longer waits for them.
-    pub(super) fn abandon_computations(&mut self) {
+    /// The client sends nothing more. Its output remains to be written, but it no longer waits for computations.
+    pub(super) fn leave(&mut self) {
         self.computations.clear();
         self.is_running = false;
+        self.gone.store(true, Ordering::Relaxed);
+        if let Some(place) = &self.place {
+            self.registry.do_send(Retire(place.id));
+        }
+        self.is_finishing = true;
     }
 }
 

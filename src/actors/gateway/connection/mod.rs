@@ -73,6 +73,7 @@ impl<S: ClientStream> Connection<S> {
             let outlets = Outlets {
                 mailbox: ctx.address().recipient(),
                 backlog: Arc::clone(&connection.backlog),
+                gone: Arc::clone(&connection.gone),
             };
             let session = ClientSession {
                 registry: connection.registry.clone(),
@@ -95,7 +96,11 @@ impl<S: ClientStream> Connection<S> {
     fn converse(&mut self, opened: Opened<S>, ctx: &mut Context<Self>) {
         self.transport = Some(opened.transport);
         let reading: Pin<Box<dyn ActorFuture<Self, Output = ()>>> = match opened.place {
-            Ok(place) => Box::pin(ClientReader::new(place, opened.first)),
+            Ok(place) => {
+                let reader = ClientReader::new(place.id, opened.first);
+                self.place = Some(place);
+                Box::pin(reader)
+            }
             Err(status) => {
                 self.refuse_in(status);
                 self.is_finishing = true;

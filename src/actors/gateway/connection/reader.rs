@@ -18,13 +18,13 @@ use tokio::time::{Instant, sleep, timeout};
 
 use super::client::{Connection, Timer, end_turn};
 use super::flow::{Ends, has_closed};
-use super::session::HeldPlace;
 use super::transport::{ClientLost, ClientStream};
+use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{
     CLOSED_CHECK, DISCARD_BYTES, FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, READ_BYTES,
     RESPONSES_TIME,
 };
-use crate::actors::gateway::registry::{Disconnect, Handled, Request, Retire};
+use crate::actors::gateway::registry::{Handled, Request, Retire};
 use crate::actors::resources::long_work::{SHORT_WORK, WorkKind, run_long_work};
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
 use crate::protocol::catalog::Service;
@@ -48,7 +48,7 @@ type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 /// The reading half of a connection.
 pub(super) struct ClientReader {
     step: ReadStep,
-    place: HeldPlace,
+    id: ConnectionId,
     /// While a frame is read, its future has these.
     held: HeldInput,
     /// Received bytes that the transport has not read yet.
@@ -86,8 +86,6 @@ enum ReadStep {
     /// The client has stopped sending, but may still read. The reader waits for the answers to its calls and
     /// computations, until the second future ends.
     Retiring(Option<BoxFuture<usize>>, BoxFuture<Result<(), Elapsed>>),
-    /// The registry removes the client.
-    Leaving(BoxFuture<Result<(), MailboxError>>),
 }
 
 impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
@@ -135,28 +133,28 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
                     if answers.is_some() || client.is_computing() {
                         let _ = ready!(gone.as_mut().poll(cx));
                     }
-                    Ok(reader.leave(client))
-                }
-                ReadStep::Leaving(left) => {
-                    let _ = ready!(left.as_mut().poll(cx));
-                    client.is_finishing = true;
+                    client.leave();
                     return Poll::Ready(());
                 }
             };
-            reader.step = next.unwrap_or_else(|lost| {
-                client.is_refused |= lost == ClientLost::Refused;
-                reader.leave(client)
-            });
+            match next {
+                Ok(step) => reader.step = step,
+                Err(lost) => {
+                    client.is_refused |= lost == ClientLost::Refused;
+                    client.leave();
+                    return Poll::Ready(());
+                }
+            }
         }
     }
 }
 
 impl ClientReader {
     /// A reader of a client with a place, whose bytes `first` have been read.
-    pub(super) fn new(place: HeldPlace, first: BytesMut) -> Self {
+    pub(super) fn new(id: ConnectionId, first: BytesMut) -> Self {
         Self {
             step: ReadStep::Reading,
-            place,
+            id,
             held: HeldInput::default(),
             chunk: first,
             has_ended: false,
@@ -364,7 +362,7 @@ impl ClientReader {
             _ => {}
         }
         let request = Request {
-            from: self.place.id,
+            from: self.id,
             incoming,
             permit: self.held.permit.clone(),
         };
@@ -377,18 +375,9 @@ impl ClientReader {
 
     /// Withdraws the client's registrations, because it can no longer answer calls.
     fn retire<S: ClientStream>(&self, client: &Connection<S>) -> ReadStep {
-        let retired = client.registry.send(Retire(self.place.id));
+        let retired = client.registry.send(Retire(self.id));
         let gone = timeout(RESPONSES_TIME, closed(client.ends));
         ReadStep::Retiring(Some(Box::pin(effect(retired))), Box::pin(gone))
-    }
-
-    /// Ends the client's place. Nobody waits for its computations any more: a broken stream takes no answers.
-    fn leave<S: ClientStream>(&mut self, client: &mut Connection<S>) -> ReadStep {
-        client.abandon_computations();
-        self.held = HeldInput::default();
-        // Answers already sent arrive before the registry's reply.
-        let left = client.registry.send(Disconnect(self.place.id));
-        ReadStep::Leaving(Box::pin(left))
     }
 }
 

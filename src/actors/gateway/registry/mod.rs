@@ -20,7 +20,7 @@ use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 use std::fmt::Display;
 use std::net::IpAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -207,7 +207,7 @@ impl Handler<Connect> for Registry {
         let link = ClientLink {
             registry: ctx.address().recipient(),
             connection: id,
-            gone: Arc::default(),
+            gone: Arc::clone(&connect.outlets.gone),
         };
         let client = Client::new(connect.outlets, connect.from, link);
         self.clients.insert(id, client);
@@ -594,6 +594,8 @@ pub struct Outlets {
     pub mailbox: Recipient<ToClient>,
     /// Bytes of responses that wait to be written. The connection updates the number.
     pub backlog: Arc<AtomicUsize>,
+    /// Whether the client has left.
+    pub gone: Arc<AtomicBool>,
 }
 
 /// Why a client was refused.
@@ -624,7 +626,7 @@ pub enum Refused {
 #[rtype(result = "Handled")]
 pub struct Retire(pub ConnectionId);
 
-/// The client has disconnected. The registry withdraws its registrations. From its connection. Idempotent.
+/// The client has disconnected, and its output is gone. The registry frees its place. From its connection. Idempotent.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Disconnect(pub ConnectionId);
