@@ -73,11 +73,11 @@ pub const FRAME_TIME: Duration = Duration::from_secs(60);
 pub const RESPONSES_TIME: Duration = Duration::from_secs(15);
 /// Most bytes of one read. It is enough for a burst of short frames.
 pub(super) const READ_BYTES: usize = 32 * KIB;
-/// Bytes offered in one write. Then other connections have a turn.
+/// Bytes offered in one write. After half of them, other connections have a turn.
 pub(super) const WRITE_BYTES: usize = 64 * 1024;
 /// Frames in one write.
 pub(super) const WRITE_FRAMES: usize = 64;
-/// Frames of a chunk, and deliveries of their messages, after which the reader yields.
+/// Frames after which the reader yields. Also messages of a WebSocket that are read ahead of the next op.
 pub(super) const FRAMES_IN_A_ROW: usize = 32;
 /// Time and bytes for which a refused client's input is discarded, so that it can read the reason. Closing a socket
 /// with unread input resets it.

@@ -50,7 +50,7 @@ pub struct Connection<S> {
     /// Whether each write has only one frame. Old clients, which end their frames without a newline, treat the bytes of
     /// one read as one frame.
     pub(super) is_single: bool,
-    /// Bytes of short responses in the outbox. The registry reads it.
+    /// Bytes of short responses that wait to be written, in the mailbox or the outbox. The registry reads it.
     pub(super) backlog: Arc<AtomicUsize>,
     /// Set when the client has left. The nodes read it.
     pub(super) gone: Arc<AtomicBool>,
@@ -151,7 +151,6 @@ impl<S: ClientStream> Connection<S> {
     fn push_response(&mut self, frame: Bytes, superseded: &[&'static str]) {
         self.responses_since.get_or_insert_with(Instant::now);
         self.outbox.push_response(frame, superseded);
-        self.note_backlog();
     }
 
     /// Refuses the client: it gets a status with the reason, and its further input is discarded.
@@ -162,6 +161,7 @@ impl<S: ClientStream> Connection<S> {
     /// The same, for a reason that is already a status.
     pub(super) fn refuse_in(&mut self, status: Bytes) {
         self.is_refused = true;
+        self.backlog.fetch_add(status.len(), Ordering::Relaxed);
         self.push_response(status, &[]);
     }
 
@@ -201,20 +201,15 @@ impl<S: ClientStream> Connection<S> {
         let may_read = self.may_read();
         self.progress = Instant::now();
         self.flow.note_written(bytes, self.progress);
+        let before = self.outbox.short_bytes();
         self.outbox.written(bytes);
-        if self.responses_since.is_some() {
-            self.note_backlog();
-        }
+        let written = before - self.outbox.short_bytes();
+        self.backlog.fetch_sub(written, Ordering::Relaxed);
         if self.outbox.response_bytes() == 0 {
             self.responses_since = None;
         }
         self.start_computation();
         !may_read && self.may_read()
-    }
-
-    fn note_backlog(&self) {
-        let waiting = self.outbox.short_bytes();
-        self.backlog.store(waiting, Ordering::Relaxed);
     }
 
     /// The earliest time of the next write, if nothing can be written now. Either a message is throttled, or the client

@@ -67,8 +67,8 @@ pub(super) struct ClientReader {
     timer: Timer,
     /// Bytes that this poll has given to the transport.
     bytes: usize,
-    /// Frames that this poll has taken, and deliveries of their messages.
-    ops: usize,
+    /// Frames that this poll has taken.
+    frames: usize,
 }
 
 /// The states of the reader.
@@ -81,11 +81,11 @@ enum ReadStep {
     WaitingForRoom(BoxFuture<Result<Permit, ClientLost>>),
     /// It reads a frame.
     Parsing(BoxFuture<(HeldInput, Parsed)>),
-    /// It waits until an op has taken effect, and counts its messages to subscribers.
-    Performing(BoxFuture<usize>),
+    /// It waits until an op has taken effect.
+    Performing(BoxFuture<()>),
     /// The client has stopped sending, but may still read. The reader waits for the answers to its calls and
     /// computations, until the second future ends.
-    Retiring(Option<BoxFuture<usize>>, BoxFuture<Result<(), Elapsed>>),
+    Retiring(Option<BoxFuture<()>>, BoxFuture<Result<(), Elapsed>>),
 }
 
 impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
@@ -99,7 +99,7 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
         cx: &mut task::Context<'_>,
     ) -> Poll<()> {
         let reader = self.get_mut();
-        (reader.bytes, reader.ops) = (0, 0);
+        (reader.bytes, reader.frames) = (0, 0);
         loop {
             let next = match &mut reader.step {
                 ReadStep::Reading => ready!(reader.poll_chunk(client, cx)),
@@ -121,7 +121,7 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
                     })
                 }
                 ReadStep::Performing(op) => {
-                    reader.ops += ready!(op.as_mut().poll(cx));
+                    ready!(op.as_mut().poll(cx));
                     Ok(ReadStep::Cutting)
                 }
                 ReadStep::Retiring(answers, gone) => {
@@ -164,7 +164,7 @@ impl ClientReader {
             speaks_json: false,
             timer: Timer::default(),
             bytes: 0,
-            ops: 0,
+            frames: 0,
         }
     }
 
@@ -204,7 +204,7 @@ impl ClientReader {
         if client.is_refused || self.is_last {
             return Poll::Ready(Ok(self.retire(client)));
         }
-        if self.ops >= FRAMES_IN_A_ROW {
+        if self.frames >= FRAMES_IN_A_ROW {
             return end_turn(cx);
         }
         ready!(self.poll_may_read(client, cx))?;
@@ -227,7 +227,7 @@ impl ClientReader {
         client: &mut Connection<S>,
         part: FramePart,
     ) -> ReadStep {
-        self.ops += 1;
+        self.frames += 1;
         match part {
             FramePart::Lines(lines) => {
                 (self.speaks_json, client.is_single) = (true, false);
@@ -381,11 +381,10 @@ impl ClientReader {
     }
 }
 
-/// Waits until a request to the registry has taken effect. Returns how many messages were sent to subscribers.
-async fn effect(handled: impl Future<Output = Result<Handled, MailboxError>>) -> usize {
-    match handled.await {
-        Ok(handled) => handled.effect().await,
-        Err(_) => 0,
+/// Waits until a request to the registry has taken effect.
+async fn effect(handled: impl Future<Output = Result<Handled, MailboxError>>) {
+    if let Ok(handled) = handled.await {
+        handled.effect().await;
     }
 }
 

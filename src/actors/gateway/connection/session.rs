@@ -232,7 +232,7 @@ impl ClientSession {
                 Opening::Foreign(Foreign::Http)
                     if first.starts_with(b"GET ") || first.starts_with(b"HEAD ") =>
                 {
-                    return Detected::Http(due.unwrap_or_else(|| Instant::now() + HEAD_TIME));
+                    return Detected::Http(deadline.unwrap_or_else(|| Instant::now() + HEAD_TIME));
                 }
                 Opening::Foreign(protocol) => return foreign(protocol.explanation()),
             }

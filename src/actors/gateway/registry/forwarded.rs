@@ -147,24 +147,26 @@ impl Requests {
         Some((own_id(number), request))
     }
 
-    /// Marks the goals of an action at `provider` as cancelled, oldest first and at most `limit`. Returns their ids there.
-    /// A goal is returned only once.
+    /// Marks the goals of an action at `provider` as cancelled, oldest first and at most `limit`. Returns their ids there,
+    /// and whether any remain. A goal is returned only once.
     pub(super) fn cancel_all(
         &mut self,
         action: &str,
         provider: ConnectionId,
         limit: usize,
-    ) -> Vec<String> {
+    ) -> (Vec<String>, bool) {
         let numbers = self.numbers(RequestKey::Provider(provider, Served::Action));
         let is_left = |goal: &Forwarded| !goal.is_cancelled && names::are_same(&goal.name, action);
         let left = numbers.filter(|number| self.get(*number).is_some_and(is_left));
-        let left: Vec<u64> = left.take(limit).collect();
-        for number in &left {
+        let mut next: Vec<u64> = left.take(limit + 1).collect();
+        let is_rest = next.len() > limit;
+        next.truncate(limit);
+        for number in &next {
             if let Some(goal) = self.outstanding.get_mut(number) {
                 goal.is_cancelled = true;
             }
         }
-        left.into_iter().map(own_id).collect()
+        (next.into_iter().map(own_id).collect(), is_rest)
     }
 
     pub(super) fn get(&self, number: u64) -> Option<&Forwarded> {

@@ -37,7 +37,7 @@ use crate::actors::gateway::limits::MAX_BACKLOG;
 pub use crate::actors::node::Nodes;
 use crate::actors::node::{Barrier, ClientLink, Done, FrameKind, Respond, guard};
 use crate::actors::resources::gauges::Gauges;
-use crate::actors::resources::memory::{Permit, cover};
+use crate::actors::resources::memory::{Permit, SHORT, cover};
 use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, ErrorForm, Level};
@@ -147,6 +147,11 @@ impl Client {
 
     /// Sends a response. `service` is the responding service, if it is the runtime's own.
     fn respond(&self, frame: Bytes, service: Option<Service>) {
+        if frame.len() <= SHORT {
+            self.outlets
+                .backlog
+                .fetch_add(frame.len(), Ordering::Relaxed);
+        }
         let response = ToClient::Respond { frame, service };
         self.outlets.mailbox.do_send(response);
     }
@@ -462,6 +467,12 @@ impl Subscriber {
         })
     }
 
+    /// Discards what a throttle holds back of the topic.
+    fn discard_held(&self) {
+        let topic = Arc::clone(&self.spelling);
+        self.mailbox.do_send(ToClient::Discard { topic });
+    }
+
     /// Sends the topic's throttle to the connection.
     fn configure(&self, throttle: Option<Throttle>) {
         self.mailbox.do_send(ToClient::Configure {
@@ -592,7 +603,7 @@ pub struct CountRefusal;
 pub struct Outlets {
     /// Its mailbox.
     pub mailbox: Recipient<ToClient>,
-    /// Bytes of responses that wait to be written. The connection updates the number.
+    /// Bytes of short responses that were sent and are not written. The registry adds, and the connection subtracts.
     pub backlog: Arc<AtomicUsize>,
     /// Whether the client has left.
     pub gone: Arc<AtomicBool>,
@@ -646,11 +657,7 @@ pub struct Request {
 /// The op has been routed. A node or the subscribers' sockets may still have to process it. The receiver ends after
 /// that.
 #[derive(MessageResponse, Default)]
-pub struct Handled {
-    effect: Option<oneshot::Receiver<()>>,
-    /// Messages sent to subscribers.
-    deliveries: usize,
-}
+pub struct Handled(Option<oneshot::Receiver<()>>);
 
 impl Handled {
     /// The op has already taken effect.
@@ -662,25 +669,15 @@ impl Handled {
     /// The op was sent to its provider, or the message to its subscribers.
     #[must_use]
     pub fn with(effect: oneshot::Receiver<()>) -> Self {
-        Self {
-            effect: Some(effect),
-            deliveries: 0,
-        }
+        Self(Some(effect))
     }
 
-    /// The message was also sent to this many subscribers.
-    #[must_use]
-    pub fn delivered(self, deliveries: usize) -> Self {
-        Self { deliveries, ..self }
-    }
-
-    /// Waits until the op has taken effect. Returns how many messages were sent to subscribers.
-    pub async fn effect(self) -> usize {
-        if let Some(effect) = self.effect {
+    /// Waits until the op has taken effect.
+    pub async fn effect(self) {
+        if let Some(effect) = self.0 {
             // The sender never sends: dropping it is the signal.
             let _ = effect.await;
         }
-        self.deliveries
     }
 }
 

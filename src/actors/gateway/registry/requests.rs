@@ -394,7 +394,8 @@ impl Registry {
         Ok(())
     }
 
-    /// Forwards the cancellation of all goals of an action, as far as its server reads.
+    /// Forwards the cancellation of all goals of an action, as far as its server reads. If goals remain, the caller gets
+    /// a refusal and may call again.
     fn forward_all_cancellations(&mut self, action: &str) -> Result<(), Refusal> {
         let provider = self
             .directory
@@ -406,11 +407,11 @@ impl Registry {
         let spelling = &*provider.spelling;
         let length = messages::cancellation(spelling, &own_id(u64::MAX)).len();
         let room = MAX_BACKLOG.saturating_sub(server.backlog()) / length;
-        let ids = self.requests.cancel_all(action, provider.connection, room);
+        let (ids, is_rest) = self.requests.cancel_all(action, provider.connection, room);
         for id in &ids {
             server.send(messages::cancellation(spelling, id));
         }
-        if ids.len() == room {
+        if is_rest {
             return Err(Refusal::ProviderBusy(action.to_owned()));
         }
         Ok(())

@@ -143,7 +143,9 @@ impl Registry {
         if let Some(subscriber) = self.topics.subscriber(&absolute, topic, origin.from) {
             subscriber.change(|one| one.id != id, Some(subscription));
             if is_new && Topic::from_name(topic).is_some_and(Topic::is_latched) {
-                // The throttle of an earlier subscription must not delay this one's latched message.
+                // The throttle of an earlier subscription must not delay this one's latched message, which replaces the
+                // held one.
+                subscriber.discard_held();
                 subscriber.configure(Some(Throttle::NONE));
             }
             subscriber.configure(subscriber.throttle());
@@ -278,12 +280,12 @@ impl Registry {
             return Handled::at_once();
         }
         let encode = |spelling: &str| messages::publish_raw(spelling, &msg);
-        let delivered = self.fan_out(topic, encode);
+        let long = self.fan_out(topic, encode);
         let Some((topic, node)) = node else {
-            return self.finish_delivery(delivered, ctx);
+            return self.finish_delivery(long, ctx);
         };
         let (done, ended) = guard();
-        self.encode_aside(delivered.long, &done, ctx);
+        self.encode_aside(long, &done, ctx);
         if let Some(tap) = &mut self.tap {
             let frame = messages::publish_raw(topic.name(), &msg);
             tap(Tapped::Published(topic, &frame));
@@ -295,7 +297,7 @@ impl Registry {
             id: origin.id,
             done,
         });
-        Handled::with(ended).delivered(delivered.count)
+        Handled::with(ended)
     }
 
     /// Delivers messages of a client unchanged, if it advertises the topic.
@@ -315,12 +317,11 @@ impl Registry {
     }
 
     /// Delivers a message, or a series of messages, to every subscriber of `topic`, an absolute name, in all spellings.
-    /// `encode` makes the JSON for a spelling. Long messages are not encoded in other forms yet.
-    fn fan_out(&self, topic: &str, encode: impl Fn(&str) -> Bytes) -> Delivered {
-        let subscribers = self.topics.subscribers(topic);
+    /// `encode` makes the JSON for a spelling. Returns the long messages that are still to be encoded in other forms.
+    fn fan_out(&self, topic: &str, encode: impl Fn(&str) -> Bytes) -> Vec<ToEncode> {
         let mut plain: Vec<(&str, Bytes)> = Vec::new();
         let mut others: Vec<ToEncode> = Vec::new();
-        for subscriber in subscribers {
+        for subscriber in self.topics.subscribers(topic) {
             let (spelling, encoding) = (&*subscriber.spelling, subscriber.encoding);
             let known = plain.iter().find(|(known, _)| *known == spelling);
             let frame = match known {
@@ -346,19 +347,17 @@ impl Registry {
         for message in short {
             self.deliver_made(&message, &message.make());
         }
-        let count = subscribers.len();
-        Delivered { count, long }
+        long
     }
 
     /// Ends the delivery of a client's message. The client waits for the encoding of a long one.
-    fn finish_delivery(&self, delivered: Delivered, ctx: &mut Context<Self>) -> Handled {
-        let Delivered { count, long } = delivered;
+    fn finish_delivery(&self, long: Vec<ToEncode>, ctx: &mut Context<Self>) -> Handled {
         if long.is_empty() {
-            return Handled::at_once().delivered(count);
+            return Handled::at_once();
         }
         let (done, ended) = guard();
         self.encode_aside(long, &done, ctx);
-        Handled::with(ended).delivered(count)
+        Handled::with(ended)
     }
 
     /// Encodes long messages on worker threads, and delivers them.
@@ -453,8 +452,7 @@ impl Handler<Publish> for Registry {
             .iter()
             .flat_map(|one| self.topics.subscribers(one))
         {
-            let topic = Arc::clone(&subscriber.spelling);
-            subscriber.mailbox.do_send(ToClient::Discard { topic });
+            subscriber.discard_held();
         }
         if !self.is_wanted(name) {
             return;
@@ -465,7 +463,7 @@ impl Handler<Publish> for Registry {
         }
         let encode = |spelling: &str| messages::respelled(name, spelling, &frame);
         // A node cannot wait, and its messages are short.
-        for message in self.fan_out(name, encode).long {
+        for message in self.fan_out(name, encode) {
             self.deliver_made(&message, &message.make());
         }
         if topic.is_latched() {
@@ -492,14 +490,6 @@ impl Handler<SetTap> for Registry {
             }
         }
     }
-}
-
-/// The result of a fan-out.
-struct Delivered {
-    /// The number of subscribers.
-    count: usize,
-    /// Long messages that are still to be encoded in another form.
-    long: Vec<ToEncode>,
 }
 
 /// Whether frames of `length` bytes are sent unchanged to a subscriber that requested `encoding`.
