@@ -41,8 +41,8 @@ pub trait Gate {
 }
 
 /// Answers the requests on `stream`, whose bytes `first` have been read already. The first head must be complete by
-/// `due`. `local` is the address that the client has connected to. `cut_off` ends the connection. If it returns a
-/// sentence and there is no request yet, this is sent.
+/// `due`. `local` is the address that the client has connected to. `cut_off` ends the connection. Its sentence is sent
+/// if there is no request yet.
 ///
 /// Returns the stream and the bytes after the handshake, if it is a WebSocket now. Otherwise it has ended.
 pub async fn serve<S, G>(
@@ -51,7 +51,7 @@ pub async fn serve<S, G>(
     due: Instant,
     (site, local): (&Site, SocketAddr),
     gate: &G,
-    cut_off: impl Future<Output = Option<String>>,
+    cut_off: impl Future<Output = String>,
 ) -> Option<(S, Bytes)>
 where
     S: AsyncRead + AsyncWrite + Unpin,
@@ -112,7 +112,7 @@ where
             refusal(StatusCode::REQUEST_TIMEOUT, sentence)
         }
         Err(Some(why)) => {
-            let message = refusal(StatusCode::SERVICE_UNAVAILABLE, &why?);
+            let message = refusal(StatusCode::SERVICE_UNAVAILABLE, &why);
             // The stream is closed at once, even if the client does not read the sentence.
             let _ = timeout(Duration::ZERO, stream.write_all(&message)).await;
             return None;

@@ -16,7 +16,6 @@ use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
 use bytes::Bytes;
-use tokio::sync::Notify;
 use tokio::task::yield_now;
 use tokio::time::{Instant, Sleep, sleep_until};
 
@@ -68,8 +67,6 @@ pub struct Connection<S> {
     pub(super) is_refused: bool,
     /// Set when the reader has ended.
     pub(super) reader_has_ended: bool,
-    /// Notifies the session that the runtime is ending.
-    pub(super) finish: Arc<Notify>,
 }
 
 impl<S: ClientStream> Connection<S> {
@@ -99,7 +96,6 @@ impl<S: ClientStream> Connection<S> {
             is_finishing: false,
             is_refused: false,
             reader_has_ended: false,
-            finish: Arc::default(),
         }
     }
 
@@ -134,10 +130,7 @@ impl<S: ClientStream> Connection<S> {
             }
             ToClient::Configure { topic, throttle } => self.outbox.configure(&topic, throttle),
             ToClient::Discard { topic } => self.outbox.discard_held(&[&*topic]),
-            ToClient::Finish => {
-                self.is_finishing = true;
-                self.finish.notify_one();
-            }
+            ToClient::Finish => self.is_finishing = true,
         }
     }
 
@@ -297,6 +290,10 @@ impl<S: ClientStream> Handler<ToClient> for Connection<S> {
     fn handle(&mut self, message: ToClient, ctx: &mut Context<Self>) {
         if let Err(panic) = contain(|| self.accept(message)) {
             Self::fail("actor", &panic, ctx);
+        }
+        if self.is_finishing && self.transport.is_none() {
+            // The session has not ended, so nothing waits to be sent.
+            ctx.stop();
         }
     }
 }

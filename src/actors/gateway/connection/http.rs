@@ -2,11 +2,12 @@
 //!
 //! **Invariant:** over WebSocket, no status is sent before the client requests statuses.
 
-use std::future::pending;
+use std::cell::RefCell;
+use std::future::poll_fn;
+use std::pin::Pin;
+use std::task::{Poll, ready};
 
 use bytes::BytesMut;
-use tokio::sync::mpsc::{self, Sender};
-use tokio::sync::oneshot;
 use tokio::time::Instant;
 
 use super::admission::HeldSlot;
@@ -20,17 +21,37 @@ use crate::web::serve::{self, Gate};
 /// A client without a place: its slot, and the reason.
 pub(super) type Newcomer = (HeldSlot, Refused);
 
-/// Asks the session whether a client is admitted. The session takes only the first request of a client without a place.
+/// Admits a client. A newcomer gets a place, or the reason why there is none, with its first request.
 struct HttpGate<'a> {
     session: &'a ClientSession,
-    requests: Sender<oneshot::Sender<Result<(), String>>>,
+    newcomer: RefCell<Option<Newcomer>>,
+    place: RefCell<Option<HeldPlace>>,
+}
+
+impl HttpGate<'_> {
+    /// Returns the reason when a newcomer is evicted before its first request. After that the response has the reason.
+    async fn evicted(&self) -> String {
+        let why = poll_fn(|cx| {
+            let mut newcomer = self.newcomer.borrow_mut();
+            let Some((slot, why)) = &mut *newcomer else {
+                return Poll::Pending;
+            };
+            let _ = ready!(Pin::new(slot).poll(cx));
+            Poll::Ready(*why)
+        });
+        self.session.turn_away(why.await)
+    }
 }
 
 impl Gate for HttpGate<'_> {
     async fn admit(&self) -> Result<(), String> {
-        let (reply, answer) = oneshot::channel();
-        let _ = self.requests.send(reply).await;
-        answer.await.unwrap_or(Ok(()))
+        let newcomer = self.newcomer.take();
+        if let Some((mut slot, _)) = newcomer {
+            let place = self.session.wait_for_place(&mut slot).await;
+            let place = place.map_err(|why| self.session.turn_away(why))?;
+            self.place.replace(Some(place));
+        }
+        Ok(())
     }
 
     async fn delay(&self) {
@@ -48,44 +69,19 @@ impl ClientSession {
         due: Instant,
         client: Result<HeldPlace, Newcomer>,
     ) -> Option<Opened<S>> {
-        let (mut place, newcomer) = match client {
+        let (place, newcomer) = match client {
             Ok(place) => (Some(place), None),
             Err(newcomer) => (None, Some(newcomer)),
         };
-        let (requests, mut asked) = mpsc::channel(1);
         let gate = HttpGate {
             session: self,
-            requests,
-        };
-        // Returns the reason for an evicted client. After its request, the response has the reason instead.
-        let admitting = async {
-            if let Some((mut slot, why)) = newcomer {
-                let request = tokio::select! {
-                    biased;
-                    request = asked.recv() => request,
-                    _ = &mut slot => return self.turn_away(why),
-                };
-                let answer = match self.wait_for_place(&mut slot).await {
-                    Ok(held) => {
-                        place = Some(held);
-                        Ok(())
-                    }
-                    Err(why) => Err(self.turn_away(why)),
-                };
-                let _ = request.map(|reply| reply.send(answer));
-            }
-            drop(asked);
-            pending().await
-        };
-        let cut_off = async {
-            tokio::select! {
-                () = self.finish.notified() => None,
-                why = admitting => Some(why),
-            }
+            newcomer: RefCell::new(newcomer),
+            place: RefCell::new(place),
         };
         let site = (&self.admission.site, self.ends.local);
-        let (stream, behind) = serve::serve(stream, first, due, site, &gate, cut_off).await?;
-        let place = place?;
+        let served = serve::serve(stream, first, due, site, &gate, gate.evicted());
+        let (stream, behind) = served.await?;
+        let place = gate.place.into_inner()?;
         let quiet = Request {
             from: place.id,
             incoming: Incoming {

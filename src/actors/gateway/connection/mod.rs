@@ -77,7 +77,6 @@ impl<S: ClientStream> Connection<S> {
             };
             let session = ClientSession {
                 registry: connection.registry.clone(),
-                finish: Arc::clone(&connection.finish),
                 admission,
                 ends,
                 outlets,

@@ -9,7 +9,6 @@ use std::time::Duration;
 use actix::prelude::*;
 use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
-use tokio::sync::Notify;
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
 use super::admission::{
@@ -18,9 +17,7 @@ use super::admission::{
 use super::flow::Ends;
 use super::transport::{ClientStream, Transport};
 use crate::actors::ConnectionId;
-use crate::actors::gateway::limits::{
-    FRAME_TIME, HEAD_TIME, LINGER, LOOK_AGAIN, OPENING_TIME, READ_BYTES,
-};
+use crate::actors::gateway::limits::{FRAME_TIME, HEAD_TIME, LOOK_AGAIN, OPENING_TIME, READ_BYTES};
 use crate::actors::gateway::registry::{
     Connect, CountRefusal, Disconnect, Outlets, Refused, Registry,
 };
@@ -33,8 +30,6 @@ use crate::protocol::wire::json::Payload;
 /// A client whose protocol is being detected.
 pub(super) struct ClientSession {
     pub(super) registry: Addr<Registry>,
-    /// Notified when the runtime ends the connection first.
-    pub(super) finish: Arc<Notify>,
     pub(super) admission: Arc<Admission>,
     pub(super) ends: Ends,
     pub(super) outlets: Outlets,
@@ -72,8 +67,6 @@ enum Detected {
     Http(Instant),
     /// It is refused with this status.
     Refused(Bytes),
-    /// The runtime ends the connection.
-    Gone,
 }
 
 impl ClientSession {
@@ -109,16 +102,12 @@ impl ClientSession {
                     }
                     Detected::Command => self.wait_for_place(&mut slot).await,
                     Detected::Json => self.connect(false).await,
-                    Detected::Refused(_) | Detected::Gone => place,
+                    Detected::Refused(_) => place,
                 };
                 how
             }
         };
         let place = match (how, place) {
-            (Detected::Gone, _) => {
-                let _ = timeout(LINGER, stream.shutdown()).await;
-                return None;
-            }
             (Detected::Refused(why), _) => Err(why),
             #[cfg(feature = "web")]
             (Detected::Http(due), Ok(place)) => {
@@ -238,7 +227,6 @@ impl ClientSession {
             }
             let read = tokio::select! {
                 biased;
-                () = self.finish.notified() => return Detected::Gone,
                 // A few bytes are enough, and `first` has room for them.
                 read = stream.read_buf(first) => read,
                 () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
