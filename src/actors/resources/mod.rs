@@ -6,4 +6,5 @@ pub mod gauges;
 pub mod long_work;
 pub mod memory;
 pub mod priority;
+pub mod turns;
 pub mod work_clock;

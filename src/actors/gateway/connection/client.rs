@@ -9,15 +9,14 @@
 //! break. One poll writes a bounded number of bytes.
 
 use std::collections::VecDeque;
-use std::pin::{Pin, pin};
+use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
 use bytes::Bytes;
-use tokio::task::yield_now;
-use tokio::time::{Instant, Sleep, sleep_until};
+use tokio::time::Instant;
 
 use super::flow::{Ends, FRESH, FlowControl, UnreadSource};
 use super::session::HeldPlace;
@@ -29,6 +28,7 @@ use crate::actors::gateway::registry::{Registry, Request, Retire, ToClient};
 use crate::actors::panics::{Contained, contain};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::SHORT;
+use crate::actors::resources::turns::{Timer, end_turn};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::outbox::{MAX_AGE, Outbox};
@@ -404,30 +404,5 @@ impl ClientWriter {
         }
         let due = *self.end_due.get_or_insert_with(|| Instant::now() + LINGER);
         self.timer.poll(Some(due), cx).map(|()| false)
-    }
-}
-
-/// Ends the turn of a task that has more to do. It is polled again after every other task that is ready, and after the
-/// sockets.
-pub(super) fn end_turn<T>(cx: &mut task::Context<'_>) -> Poll<T> {
-    let _ = pin!(yield_now()).poll(cx);
-    Poll::Pending
-}
-
-/// A timer whose deadline may change.
-#[derive(Default)]
-pub(super) struct Timer(Option<Pin<Box<Sleep>>>);
-
-impl Timer {
-    /// Ready once `due` has passed. Without a deadline it is never ready.
-    pub(super) fn poll(&mut self, due: Option<Instant>, cx: &mut task::Context<'_>) -> Poll<()> {
-        let Some(due) = due else {
-            return Poll::Pending;
-        };
-        let timer = self.0.get_or_insert_with(|| Box::pin(sleep_until(due)));
-        if timer.deadline() != due {
-            timer.as_mut().reset(due);
-        }
-        timer.as_mut().poll(cx)
     }
 }

@@ -58,8 +58,6 @@ pub struct Registry {
     requests: Requests,
     /// Providers that have disconnected while calls or goals waited for them.
     gone: VecDeque<ConnectionId>,
-    /// Time of the next cleanup, and the task that waits for it.
-    next_cleanup: Option<(Instant, SpawnHandle)>,
     nodes: Nodes,
     /// The last message of each latched topic that has subscribers.
     latched: HashMap<Topic, Bytes>,
@@ -179,6 +177,10 @@ impl Client {
 
 impl Actor for Registry {
     type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        Self::start_cleanup(ctx);
+    }
 }
 
 impl Handler<Attach> for Registry {
@@ -233,9 +235,8 @@ impl Handler<CountRefusal> for Registry {
 impl Handler<Retire> for Registry {
     type Result = Handled;
 
-    fn handle(&mut self, Retire(id): Retire, ctx: &mut Context<Self>) -> Handled {
+    fn handle(&mut self, Retire(id): Retire, _: &mut Context<Self>) -> Handled {
         self.withdraw(id);
-        self.schedule_cleanup(ctx);
         let client = self.clients.get_mut(&id);
         let calls = client.and_then(|client| client.calls.take());
         calls.map_or_else(Handled::at_once, |(_, all_ended)| Handled::with(all_ended))
@@ -245,14 +246,13 @@ impl Handler<Retire> for Registry {
 impl Handler<Disconnect> for Registry {
     type Result = ();
 
-    fn handle(&mut self, Disconnect(id): Disconnect, ctx: &mut Context<Self>) {
+    fn handle(&mut self, Disconnect(id): Disconnect, _: &mut Context<Self>) {
         self.withdraw(id);
         self.requests.forget_caller(id);
         if let Some(client) = self.clients.remove(&id) {
             client.link.gone.store(true, Ordering::Relaxed);
             self.gauges.set_connections(self.clients.len() as u64);
         }
-        self.schedule_cleanup(ctx);
     }
 }
 
@@ -330,7 +330,7 @@ impl Registry {
         let refusal = match op {
             Op::Publish { topic, msg } => return self.publish(origin, &topic, msg, ctx),
             Op::PublishLines(lines) => return self.publish_lines(origin.from, &lines, ctx),
-            Op::CallService(call) => return self.call(origin, call, ctx),
+            Op::CallService(call) => return self.call(origin, call),
             Op::SendActionGoal(goal) => return self.send_action_goal(origin, goal),
             Op::CancelActionGoal { action } => return self.cancel_action_goal(&origin, &action),
             Op::Advertise { topic, type_name } => {

@@ -3,12 +3,14 @@
 //! **Invariant:** every call has one response. Every goal has one `action_result`, unless its sender disconnects first.
 
 use std::fmt::Display;
+use std::pin::Pin;
 use std::sync::Arc;
+use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
 use bytes::Bytes;
 use serde_json::json;
-use tokio::time::{Instant, sleep_until};
+use tokio::time::Instant;
 
 use super::forwarded::{Forwarded, own_id};
 use super::refusal::Refusal;
@@ -18,6 +20,7 @@ use crate::actors::node::{
     ActionClient, ActionRequest, Caller, CancelSent, Done, ForwardGoal, Route, ServiceCall, guard,
 };
 use crate::actors::resources::memory::cover_message;
+use crate::actors::resources::turns::{Timer, end_turn};
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
@@ -35,12 +38,7 @@ const ENDED_IN_A_ROW: usize = 128;
 
 impl Registry {
     /// Sends a call to the node or the client that serves it. A failure is the call's one response.
-    pub(super) fn call(
-        &mut self,
-        origin: FrameOrigin,
-        call: CallService,
-        ctx: &mut Context<Self>,
-    ) -> Handled {
+    pub(super) fn call(&mut self, origin: FrameOrigin, call: CallService) -> Handled {
         let own = Service::from_name(&call.service);
         let cancelled = self.action_to_cancel(&call.service);
         let refusal = match (self.closed, own, cancelled) {
@@ -63,7 +61,6 @@ impl Registry {
                 )
             }
         };
-        self.schedule_cleanup(ctx);
         if let Err(why) = refusal {
             self.refuse_call(&origin, &call.service, &why, own);
         }
@@ -546,29 +543,29 @@ impl Registry {
 
 // ---- cleanup: requests end in batches, and other messages are handled in between ------------------------------------
 
-impl Registry {
-    /// Schedules the next cleanup: at once if a provider has disconnected, else at the earliest deadline.
-    pub(super) fn schedule_cleanup(&mut self, ctx: &mut Context<Self>) {
-        let left = (!self.gone.is_empty()).then(Instant::now);
-        let Some(due) = left.or_else(|| self.requests.next_deadline()) else {
-            return;
-        };
-        if let Some((at, waiting)) = self.next_cleanup {
-            if at <= due {
-                return;
-            }
-            ctx.cancel_future(waiting);
+/// Ends calls past their deadlines, and requests of disconnected providers. The actor polls it after each message.
+struct Cleanup(Timer);
+
+impl ActorFuture<Registry> for Cleanup {
+    type Output = ();
+
+    fn poll(
+        mut self: Pin<&mut Self>,
+        registry: &mut Registry,
+        _: &mut Context<Registry>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<()> {
+        if registry.gone.is_empty() {
+            ready!(self.0.poll(registry.requests.next_deadline(), cx));
         }
-        let wait = async move {
-            tokio::task::yield_now().await;
-            sleep_until(due).await;
-        };
-        let waiting = ctx.spawn(wait.into_actor(self).map(|(), registry, ctx| {
-            registry.next_cleanup = None;
-            registry.clean_up_batch();
-            registry.schedule_cleanup(ctx);
-        }));
-        self.next_cleanup = Some((due, waiting));
+        registry.clean_up_batch();
+        end_turn(cx)
+    }
+}
+
+impl Registry {
+    pub(super) fn start_cleanup(ctx: &mut Context<Self>) {
+        ctx.spawn(Cleanup(Timer::default()));
     }
 
     /// Ends one batch: first calls past their deadlines, then requests of disconnected providers.
