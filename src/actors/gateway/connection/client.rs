@@ -63,7 +63,8 @@ pub struct Connection<S> {
     is_running: bool,
     /// Set when nothing more is read. Queued messages are still sent.
     pub(super) is_finishing: bool,
-    /// Set if the client uses another protocol or violates a rule. It gets the reason, and its input is discarded.
+    /// Set if the client has no place, uses another protocol or violates a rule. It gets the reason, and its input is
+    /// discarded.
     pub(super) is_refused: bool,
     /// Set when the reader has ended.
     pub(super) reader_has_ended: bool,

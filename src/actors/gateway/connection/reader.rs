@@ -50,7 +50,7 @@ type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 pub(super) struct ClientReader {
     step: ReadStep,
     id: ConnectionId,
-    /// While a frame is read, its future has these.
+    /// Pieces of a message and the memory permit. While a frame is parsed, its future owns them.
     held: HeldInput,
     /// Received bytes that the transport has not read yet.
     chunk: BytesMut,
@@ -62,7 +62,7 @@ pub(super) struct ClientReader {
     frame_due: Option<Instant>,
     /// While a client that has ended its stream must not be read: the start of this time, and the wait until it has
     /// closed its socket.
-    unread: Option<(Instant, BoxFuture<()>)>,
+    blocked: Option<(Instant, BoxFuture<()>)>,
     /// Whether a JSON object has arrived. Then the client does not use HTTP, because a request has its head first.
     speaks_json: bool,
     timer: Timer,
@@ -161,7 +161,7 @@ impl ClientReader {
             has_ended: false,
             is_last: false,
             frame_due: None,
-            unread: None,
+            blocked: None,
             speaks_json: false,
             timer: Timer::default(),
             bytes: 0,
@@ -324,7 +324,7 @@ impl ClientReader {
             self.frame_due = None;
             if self.has_ended {
                 let begin = || (Instant::now(), Box::pin(closed(client.ends)) as _);
-                let (since, closed) = self.unread.get_or_insert_with(begin);
+                let (since, closed) = self.blocked.get_or_insert_with(begin);
                 let due = client.progress.max(*since) + RESPONSES_TIME;
                 if closed.as_mut().poll(cx).is_pending() {
                     ready!(self.timer.poll(Some(due), cx));
@@ -338,7 +338,7 @@ impl ClientReader {
             self.has_ended = ready!(transport.poll_read(cx, &mut self.chunk))? == 0;
             transport.look_ahead(&mut self.chunk)?;
         }
-        self.unread = None;
+        self.blocked = None;
         Poll::Ready(Ok(()))
     }
 

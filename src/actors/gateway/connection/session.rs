@@ -58,8 +58,8 @@ impl Drop for HeldPlace {
 
 /// The result of the detection by a client's first bytes.
 enum Detected {
-    /// It exchanges frames.
-    Json,
+    /// It exchanges frames, or has ended or was too slow before its protocol was known.
+    Frames,
     /// It exchanges frames, and is a command of this program.
     Command,
     /// It uses HTTP. The head of its first request must be complete by this time.
@@ -82,7 +82,7 @@ impl ClientSession {
         };
         let how = match place {
             Ok(_) => self.detect(&mut stream, &mut first, None).await,
-            Err(Refused::Closed) => Detected::Json,
+            Err(Refused::Closed) => Detected::Frames,
             Err(why) => {
                 let mut slot = self.admission.newcomers.take();
                 let time = if asks_token { HEAD_TIME } else { OPENING_TIME };
@@ -101,7 +101,7 @@ impl ClientSession {
                         return self.serve_http(stream, first, due, Err((slot, why))).await;
                     }
                     Detected::Command => self.wait_for_place(&mut slot).await,
-                    Detected::Json => self.connect(false).await,
+                    Detected::Frames => self.connect(false).await,
                     Detected::Refused(_) => place,
                 };
                 how
@@ -128,7 +128,7 @@ impl ClientSession {
         S: AsyncRead + Unpin,
     {
         let how = self.detect(stream, first, Some(due)).await;
-        if !matches!(how, Detected::Json) {
+        if !matches!(how, Detected::Frames) {
             return how;
         }
         let frame = first_frame(stream, first, due).await;
@@ -145,7 +145,7 @@ impl ClientSession {
         if frame.is_ok_and(|frame| is_command(&frame)) {
             Detected::Command
         } else {
-            Detected::Json
+            Detected::Frames
         }
     }
 
@@ -216,7 +216,7 @@ impl ClientSession {
                         deadline.get_or_insert_with(|| Instant::now() + time);
                     }
                 }
-                Opening::Json => return Detected::Json,
+                Opening::Json => return Detected::Frames,
                 #[cfg(feature = "web")]
                 Opening::Foreign(Foreign::Http)
                     if first.starts_with(b"GET ") || first.starts_with(b"HEAD ") =>
@@ -236,12 +236,12 @@ impl ClientSession {
                             foreign(&AuthError::TooLate.to_string())
                         }
                         // It is refused like other clients without a place.
-                        Some(_) => Detected::Json,
+                        Some(_) => Detected::Frames,
                     };
                 }
             };
             if read.unwrap_or(0) == 0 {
-                return Detected::Json;
+                return Detected::Frames;
             }
         }
     }
