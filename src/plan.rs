@@ -112,7 +112,7 @@ fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(
             out,
-            "  {:<9} timestep {:.4e} s  {:>9.0} evaluations/s  error {:.2e} m",
+            "  {:<9} timestep {:.4e} s  {:>9.1} evaluations/s  error {:.2e} m",
             one.method.name(),
             one.timestep,
             f64::from(one.method.evaluations()) / one.timestep,
