@@ -209,7 +209,7 @@ struct Reference<const N: usize> {
     task: Task<N>,
     /// The duration, or the control period \[s\]: a timestep divides it.
     whole: f64,
-    /// The number of wholes in the duration.
+    /// The number of wholes, which last at least the duration.
     count: u64,
     /// The fewest steps per whole of Runge-Kutta 4.
     steps: u64,
@@ -222,8 +222,8 @@ impl<const N: usize> Reference<N> {
     async fn known_to(task: Task<N>) -> Result<Self, PlanError> {
         let (control, duration) = (&task.control, task.duration);
         let (count, whole) = if control.given_period() > 0.0 {
-            let period = control.period.period;
-            (count::whole((duration / period).round()).max(1), period)
+            let periods = duration / control.period.period * (1.0 - count::ROUNDING);
+            (count::whole(periods.ceil()).max(1), control.period.period)
         } else {
             (1, duration)
         };

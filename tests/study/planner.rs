@@ -19,13 +19,6 @@ pub(crate) fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> 
     at_once(planner::plan(task))
 }
 
-fn swing(duration: f64, error: f64) -> Task<2> {
-    Task {
-        start: State::at_rest([0.4, -0.3]),
-        ..falling(Arm::default(), duration, error)
-    }
-}
-
 /// A move from rest, and its continuous law.
 pub(crate) fn moving(
     gains: Gains<2>,
@@ -87,6 +80,18 @@ fn a_planned_move_under_control_stays_within_its_error_of_the_continuous_law() {
     assert!(costs.is_sorted_by(|one, other| one >= other));
 }
 
+/// A run has whole periods, and not one period more than the duration needs.
+#[test]
+fn a_plan_with_a_control_period_lasts_at_least_its_duration() {
+    for (duration, period, count) in [(0.0059, 0.004, 2), (0.1, 0.003, 34), (0.006, 0.0012, 5)] {
+        let (mut task, _) = moving(Gains::default(), [0.8, -0.6], duration, 1e-3);
+        task.control.period.period = period;
+        let best = plan(task).unwrap().best;
+        let run = best.evaluations as f64 / f64::from(best.method.evaluations()) * best.timestep;
+        assert!((run / period - f64::from(count)).abs() < 1e-9, "{best:?}");
+    }
+}
+
 /// A stiff loop has its largest error in its first milliseconds, a fast link at some angle of every turn: the planned run
 /// is compared after each step.
 #[test]
@@ -111,14 +116,10 @@ fn no_peak_is_overlooked() {
 
 #[test]
 fn a_chaotic_motion_is_not_planned() {
-    let chaos = Task {
-        start: State::rest(),
-        ..swing(100.0, 1e-3)
-    };
-    assert!(matches!(plan(chaos), Err(PlanError::Unknown(_))));
-    let duration = MAX_DURATION.next_up();
-    let long = plan(swing(duration, 1e-3));
-    assert_eq!(long, Err(PlanError::TooLong(duration)));
+    let swing = |duration| plan(falling(Arm::default(), duration, 1e-3));
+    assert!(matches!(swing(100.0), Err(PlanError::Unknown(_))));
+    let long = MAX_DURATION.next_up();
+    assert_eq!(swing(long), Err(PlanError::TooLong(long)));
 }
 
 pub(crate) fn falling(arm: Arm<2>, duration: f64, error: f64) -> Task<2> {
@@ -168,9 +169,8 @@ fn a_run_that_diverges_is_infinitely_far_off_however_far_is_allowed() {
         Box::new(control.simulation(State::rest()))
     };
     // The first step of 1e308 s is not finite.
-    let (run, reference) = (|| boxed(1e308), || boxed(1e-3));
-    let off = largest_distance(&arm, (run(), 1_000_000), (reference(), 1), f64::INFINITY);
-    assert!(at_once(off).is_infinite());
-    let off = largest_distance(&arm, (reference(), 1_000_000), (run(), 1), f64::INFINITY);
-    assert!(at_once(off).is_infinite());
+    for [run, reference] in [[1e308, 1e-3], [1e-3, 1e308]].map(|pair| pair.map(boxed)) {
+        let off = largest_distance(&arm, (run, 1_000_000), (reference, 1), f64::INFINITY);
+        assert!(at_once(off).is_infinite());
+    }
 }

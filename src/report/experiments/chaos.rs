@@ -11,7 +11,7 @@ use crate::study::control_loop::ControlLoop;
 use crate::study::motion::lowest;
 use crate::study::taylor::series::{differences, sums};
 
-/// Energy drift over the energy scale, largest so far, at step counts that grow by a constant factor: `(time, drift)`.
+/// Energy drift over the energy scale, largest so far, at times that grow by a factor, and at the end: `(time, drift)`.
 pub fn energy_drift<const N: usize>(
     arm: &Arm<N>,
     start: &State<N>,
@@ -65,7 +65,7 @@ fn drift<const N: usize>(
         steps += LOOK;
         largest = largest.max((energy(arm, &state) - first).abs() / scale);
         let time = in_f64(steps) * h;
-        if time >= due {
+        if time >= due || time >= duration {
             points.push((time, largest));
             due = time * FACTOR;
         }
