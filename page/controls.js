@@ -42,7 +42,7 @@ function showStored() {
 function startIntegrator() {
   const check = () => { for (const radio of radios("method")) radio.checked = radio.value === state.integrator?.method; };
   const said = refusal(byId("methods"));
-  byId("methods").append(...METHODS.map(([method, name], i) => el("label", { class: "segment", title: `${name} (key ${i + 1}), and its largest stable timestep` },
+  byId("methods").append(...METHODS.map(([method, name], i) => el("label", { class: "segment", title: `${name} (key ${i + 1}), and its limit of the timestep` },
     el("input", { type: "radio", name: "method", value: method, onchange: () => said.report(setIntegrator({ method })).then(check) }),
     el("span", {}, `${shortName(method)} `, limitLabel(method)))));
   byId("methods").after(said.element);

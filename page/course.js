@@ -66,7 +66,7 @@ export const STEPS = [
     task: { text: "Make the period longer until the arm shakes.", done: ({ shook }) => shook },
     question: {
       text: "Just below the limit, what does the arm do?", answers: ["It shakes a little", "It comes to rest", "It falls"], right: 1,
-      because: "Below the limit every deviation dies away. Beyond the limit every deviation grows.",
+      because: "Below the limit small deviations die away. Just beyond the limit some of them grow.",
     },
   },
   {
@@ -78,7 +78,7 @@ export const STEPS = [
     task: { text: "Shorten the period until the bars shrink.", done: ({ shrinks, stable }) => shrinks && stable },
     question: {
       text: "At the first period the last bars pointed up and down in turn. Why?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
-      because: "The torque is held too long. It pushes the joint past the target. Beyond the limit each push goes further than the one before.",
+      because: "The torque is held too long. It pushes the joint past the target. At this period the pushes grow.",
     },
   },
   {
@@ -89,7 +89,7 @@ export const STEPS = [
     task: { text: "Try all four methods at this period.", done: ({ methods }) => methods.size === ALL },
     question: {
       text: "Why does a better method not help?", answers: ["The controller still measures as rarely", "Euler is exact enough", "The controller is too weak"], right: 0,
-      because: "The limit comes from the hold between two measurements. A real robot has no method, but the same limit.",
+      because: "This limit comes from the hold between two measurements. A real robot has no method, but such a limit too.",
     },
   },
   {
@@ -99,30 +99,30 @@ export const STEPS = [
     chart: "errors", dial: "timestep",
     task: { text: "Make the error of the method 100 times smaller.", done: ({ gain }) => gain >= MUCH },
     question: {
-      text: "Which error did not change?", answers: ["That of the hold", "That of the method", "None"], right: 0,
-      because: "A finer timestep improves the simulation. Only a shorter period improves the control.",
+      text: "Which error hardly changed?", answers: ["That of the hold", "That of the method", "None"], right: 0,
+      because: "A finer timestep improves the simulation, not the control. A shorter period would improve the control here.",
     },
   },
   {
     id: "limit", title: "What sets the limit",
-    text: "More damping or less mass makes the arm react faster: the controller must measure more often. The limit is about T = 2 λmin(Kd⁻¹ M). M is the mass matrix, Kd the damping, λmin the smallest eigenvalue.",
+    text: "Here more damping or less mass makes the arm react faster: the controller must measure more often. The limit is about T = 2 λmin(Kd⁻¹ M). M is the mass matrix, Kd the damping, λmin the smallest eigenvalue.",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "map", dial: "damping",
     task: { text: "Change damping and mass until this period is stable.", done: ({ stable }) => stable },
     question: {
       text: "You halve the damping. What does the limit do?", answers: ["It halves", "It doubles", "It stays"], right: 1,
-      because: "In the formula the damping is in the denominator: half of it gives twice the time. With far too little damping no period is stable.",
+      because: "In the formula the damping is in the denominator: half of it gives twice the time. With far too little damping the formula no longer holds.",
     },
   },
   {
     id: "energy", title: "Without a controller",
-    text: "Nothing drives this swing, so its energy should stay constant. Euler at 5 ms adds a little at every step. Choose methods and watch the total.",
+    text: "Nothing drives this swing, so its energy should stay constant. Euler at 5 ms makes it grow. Choose methods and watch the total.",
     scene: (links) => ({ ...structuredClone(DEFAULTS[links]), integrator: { method: "euler", timestep: 0.005 }, controller: false }),
     chart: "energy", dial: "timestep", methods: true,
     task: { text: "Find a method that keeps the energy at 5 ms for 3 s.", done: ({ energy }) => energy.high - energy.low <= KEPT && energy.until - energy.since >= LONG },
     question: {
       text: "Can Euler keep the energy with a shorter step?", answers: ["Yes, below 1 ms", "No, the energy only grows more slowly", "Yes, below 0.1 ms"], right: 1,
-      because: "Without damping every Euler step makes a swing a little wider, however short the step is.",
+      because: "Without damping, Euler makes even a small swing wider, however short the step is.",
     },
   },
   {
@@ -133,7 +133,7 @@ export const STEPS = [
     task: { text: "Measure the four methods.", done: ({ measured }) => measured },
     question: {
       text: "The control period stays the same. What does Runge–Kutta 4 at 0.25 ms improve?", answers: ["The robot", "Nearly nothing", "The limit"], right: 1,
-      because: "The error of the hold is far larger than the error of the method. Reduce the larger one first.",
+      because: "Here the error of the hold is far larger than the error of the method. Reduce the larger one first.",
     },
   },
   {
@@ -154,8 +154,8 @@ export const STEPS = [
     chart: "form", dial: null,
     task: { text: "Make the sheet of your arm.", done: ({ sheet }) => sheet },
     question: {
-      text: "Your period is too long. What helps?", answers: ["A better method", "Less damping gain or a faster controller", "A shorter timestep"], right: 1,
-      because: "The gains and the masses set that limit. Method and timestep do not.",
+      text: "Your period is too long. What helps?", answers: ["A better method", "A faster controller or other gains", "A shorter timestep"], right: 1,
+      because: "The gains and the arm set that limit. It belongs to a real robot too, which has no method and no timestep.",
     },
   },
 ];
@@ -198,7 +198,7 @@ export function ofLimit(time, limit) {
   const short = (/** @type {number} */ ms) => String(Number(ms.toPrecision(2)));
   if (!(time >= 0)) return "–";
   if (Number.isNaN(limit) || limit === Infinity) return `${short(time)} ms`;
-  return limit === 0 ? `${short(time)} ms, never stable` : `${short(time)} of ${short(limit)} ms`;
+  return limit === 0 ? `${short(time)} ms, none known as stable` : `${short(time)} of ${short(limit)} ms`;
 }
 
 /** The step that a link names, from 0; -1 if it names none. @param {string} hash */

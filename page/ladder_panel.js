@@ -79,7 +79,7 @@ function describe(about) {
 /** @param {Rung[]} best the cheapest sufficient run of each method */
 function inWords(best) {
   const controlled = found.some(({ sampling }) => sampling !== null);
-  const meaning = controlled ? " Solid lines: error of the method. Dashed lines: distance from a controller without a hold, which a better method does not reduce. The table shows both [rad]: method + hold." : " The table shows the errors [rad].";
+  const meaning = controlled ? " Solid lines: error of the method. Dashed lines: distance from a controller without a hold. The table shows both [rad]: method + hold." : " The table shows the errors [rad].";
   if (best.length === 0) return `No run ${controlled ? "keeps both errors" : "came"} within ${WANTED} rad${controlled ? "" : " of the exact motion"}.${meaning}`;
   const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
   const uncertainty = uncertaintyOf(found);

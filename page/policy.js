@@ -49,7 +49,7 @@ export function motionHasChanged(/** @type {any} */ answer, /** @type {any} */ d
   return open(then) !== now && !(Math.abs(now / open(then) - 1) < NEWS);
 }
 
-/** A limit in an answer. Null means no limit. @param {number | null | undefined} served */
+/** A limit in an answer. Null means that no limit was found. @param {number | null | undefined} served */
 function open(served) {
   return served ?? Infinity;
 }
@@ -93,7 +93,7 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   };
 }
 
-/** The timestep's limit at the present control period. If the period itself is too long, no timestep helps, and the limit of a law at every step is used. */
+/** The timestep's limit at the present control period. If the period itself is too long, a shorter timestep does not help, and the limit of a law at every step is used. */
 function heldLimit(/** @type {any} */ state, /** @type {any} */ answer) {
   const own = open(answer.timestep_limit);
   return state.period?.period > 0 && answer.timestep_limit !== undefined && own > 0 ? own : open(answer.timestep_limit_held);
@@ -139,7 +139,7 @@ function acts(/** @type {any} */ { enabled, gains }) {
   return enabled === true && gains != null && !isFree(gains);
 }
 
-/** Whether the control law runs too rarely, so that the arm shakes at every timestep. */
+/** Whether the control law runs too rarely. */
 function periodIsTooLong(/** @type {any} */ state, /** @type {any} */ answer) {
   const steps = stepsPerUpdate(state);
   return acts(state) && (steps > 1 || state.period?.delay) && steps * state.integrator.timestep > periodLimitIn(state, answer);
@@ -184,10 +184,10 @@ export function verdict(/** @type {any} */ state) {
   }
   if (Number.isNaN(limit) || Number.isNaN(timestep)) return { kind: "unknown", pill: "limit unknown", sentence: "", ...known };
   if (time > limit) {
-    return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? `beyond ${name}` : "never stable", sentence: above, ...known };
+    return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? `beyond ${name}` : "no stable timestep", sentence: above, ...known };
   }
   if (time > everyPose) {
-    const others = everyPose > 0 ? `other poses are stable only up to ${duration(everyPose)}: on the way there the arm may shake` : "in other poses no timestep is stable, because of the gains";
+    const others = everyPose > 0 ? `other poses are stable only up to ${duration(everyPose)}: on the way there the arm may shake` : "for other poses no stable timestep is known, because of the gains";
     const sentence = `${at} is stable ${where}, but ${others}.`;
     return { kind: "here", pill: "stable here only", sentence, ...known };
   }
@@ -199,7 +199,7 @@ function excess(at, time, named, limit, where) {
   if (!(time > limit)) return "";
   return limit > 0
     ? `${at} is above ${named}, ${where}.`
-    : `No timestep is stable, ${where}.`;
+    : `No stable timestep is known, ${where}.`;
 }
 
 /** @param {number} limit */
@@ -253,31 +253,31 @@ export function whyText(/** @type {any} */ state) {
 
 /** @param {any} answer @param {string} method @param {number} limit */
 function whyFree({ critical }, method, limit) {
-  if (limit === 0) return `Why: nothing damps the free arm. Every step of ${methodName(method)} adds a little to each swing, however short the step is.`;
+  if (limit === 0) return `Why: nothing damps the free arm. With ${methodName(method)} even a small swing grows, however short the step is.`;
   if (limit === Infinity || !critical) return "";
-  return `Why: beyond ${duration(limit)} ${methodName(method)} no longer follows the fastest small swing of the free arm. Wide and fast swings have a smaller limit.`;
+  return `Why: beyond ${duration(limit)} ${methodName(method)} no longer follows the fastest small swing of the free arm. Wide and fast swings may need shorter steps.`;
 }
 
 /** The reason for the limit of a loop with a controller: the motion that grows first beyond the smallest limit of all poses. @param {any} answer @param {number} limit */
 export function cause({ critical, minimum_over_poses_held: least, equilibrium_kind, timestep_limit_continuous }, limit) {
   if (limit === 0) {
     return equilibrium_kind === "unstable" || timestep_limit_continuous === 0
-      ? "these gains do not hold the arm here, with any method and any timestep. Raise the derivative gains, or lower the integral gains."
-      : "nothing damps the arm here, and a torque that is held for a step is a little late. Raise the derivative gains.";
+      ? "no stable timestep is known for these gains here. Higher derivative gains or lower integral gains may help."
+      : "too little damps the arm here, and a torque that is held for a step is a little late. Higher derivative gains may help.";
   }
   if (!critical || !(least > 0)) return "beyond it a deviation grows.";
   const joint = `joint ${critical.joint + 1}`;
   const percent = significant(100 * (critical.growth_per_step - 1), 2);
   const flips = critical.frequency * FLIP * BEYOND * least > NEARLY;
   if (flips) return `${joint} is the fastest. A torque that is held longer overshoots: 10 % beyond the limit the deviation flips at every step and grows by ${percent} %.`;
-  return `a swing of ${joint} at ${significant(critical.frequency, 3)} Hz grows first: the torque comes too late and drives it. A higher derivative gain damps it.`;
+  return `a swing of ${joint} at ${significant(critical.frequency, 3)} Hz grows first: the torque comes too late and drives it. A higher derivative gain may help.`;
 }
 
 /** @param {Limits} limits */
 export function others(limits) {
   const finite = Object.values(limits);
   const [least, most] = [Math.min(...finite), Math.max(...finite)];
-  if (most <= ALIKE * least) return "A better method does not help, because the controller acts only once a step. A better method only makes the simulated motion more exact.";
+  if (most <= ALIKE * least) return "A better method hardly helps here, because the controller acts only once a step. It makes the simulated motion more exact.";
   const best = METHODS.filter(([method]) => limits[method] > most / ALIKE).map(([, name]) => name);
   return `${best.join(", ")}: stable up to ${limitText(most)}.`;
 }

@@ -86,7 +86,7 @@ function describeMap() {
   if (!row || !state.integrator) return;
   setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
   setText(byId("map-text"), `Solid line: limit of ${methodName(state.integrator.method)}, ${limitText(row.limit)} with these gains. Dashed line: limit of a controller without a hold, ${limitText(row.continuous)}. `
-    + `Higher gains need a smaller timestep; gains that are too low cannot hold the arm. The map is for a controller that acts at every step. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to set gains and timestep.`);
+    + `The map is for a controller that acts at every step. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to set gains and timestep.`);
 }
 
 function goTo(left, top) {

@@ -127,8 +127,8 @@ fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {
     };
     let _ = writeln!(
         out,
-        "Plan: {} at a timestep of {:.4e} s{period}. The reference is known to {:.0e} m. Methods that are not \
-         listed cost more.",
+        "Plan: {} at a timestep of {:.4e} s{period}. The reference is known to {:.0e} m. No cheaper run \
+         was found.",
         best.method.name(),
         best.timestep,
         planned.uncertainty

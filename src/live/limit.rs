@@ -166,7 +166,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
                 Shown(motion.speed)
             ),
             Exceeded::Timestep if limit == 0.0 => {
-                format!("{method} is predicted to be unstable at every timestep {place}")
+                format!("no stable timestep is predicted for {method} {place}")
             }
             Exceeded::Timestep => {
                 let is_default = simulation.control_period() == ControlPeriod::default();

@@ -14,7 +14,7 @@ use crate::math::integrator::Method;
 /// grow. With as many, the limit of Runge-Kutta 4 is that of exact motion to 1e-6, in soft loops too.
 const MOST_STEPS: u32 = 64;
 
-/// The largest stable control period and timestep \[s\]. Zero: no value is stable. `None`: there is no limit.
+/// The largest stable control period and timestep \[s\]. Zero: no stable one was found. `None`: no limit was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClockLimits {
     /// The control period, for exact motion between two runs of the law.

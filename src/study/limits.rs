@@ -60,7 +60,7 @@ impl Rest {
     }
 }
 
-/// Largest stable timesteps \[s\]. `Some(0.0)`: unstable at every timestep. `None`: no timestep was found unstable. An
+/// Largest stable timesteps \[s\]. `Some(0.0)`: none was found stable. `None`: no timestep was found unstable. An
 /// example is a free arm without gravity, whose linearised motion every method reproduces at any timestep.
 ///
 /// If all gains are zero, the arm is free, and the pose is the hanging one.

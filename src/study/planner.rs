@@ -77,8 +77,7 @@ pub struct Candidate {
 pub struct Planned {
     /// The cheapest run.
     pub best: Candidate,
-    /// The runs that were within the error, the cheapest last. Methods without a candidate are more expensive, or
-    /// exceed the error.
+    /// The runs that were within the error, the cheapest last. No cheaper run of the other methods was found.
     pub candidates: Vec<Candidate>,
     /// Uncertainty of the reference \[m\].
     pub uncertainty: f64,
@@ -97,10 +96,10 @@ pub enum PlanError {
     /// No method stays within the given error \[m\].
     #[error("error must be larger: no method stays within {} m in {MAX_STEPS} steps", Shown(*.0))]
     NotFound(f64),
-    /// Nothing was simulated, since the loop is unstable at every timestep.
+    /// Nothing was simulated, since no stable timestep was found.
     #[error(
-        "gains or control_period must be changed: the loop is unstable at every timestep, at the setpoint or in a pose \
-         on the way (/study/stability returns the pose), so nothing was simulated"
+        "gains or control_period must be changed: the loop is unstable at all timesteps that were tried, at the \
+         setpoint or in a pose on the way (/study/stability returns the pose), so nothing was simulated"
     )]
     Unstable,
     /// Nothing was simulated, since the longest timestep that is stable with any method is too small \[s\].

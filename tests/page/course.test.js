@@ -55,7 +55,7 @@ test("bars that flip and grow differ from bars that decay", () => {
 test("a time and its limit have the same unit", () => {
   assert.equal(ofLimit(5.5, 4.316), "5.5 of 4.3 ms");
   assert.equal(ofLimit(1, NaN), "1 ms");
-  assert.equal(ofLimit(5, 0), "5 ms, never stable");
+  assert.equal(ofLimit(5, 0), "5 ms, none known as stable");
 });
 
 test("a link names a step by number or by name", () => {

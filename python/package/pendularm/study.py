@@ -41,13 +41,13 @@ class Critical:
 
 @dataclass(frozen=True, eq=False)
 class Stability:
-    """The largest stable timesteps and control period of a control loop [s]. `None` means no limit, 0 unstable at
-    every timestep."""
+    """Limits of the timesteps and the control period of a control loop [s]: the end of the first stable range. `None`
+    means that no unstable time was found, 0 that no stable one was found."""
 
     control_period_limit: float | None
-    """The longest stable control period at `equilibrium`, of an arm that moves exactly between two runs of the law."""
+    """The limit of the control period at `equilibrium`, of an arm that moves exactly between two runs of the law."""
     timestep_limit: float | None
-    """The longest stable timestep at `equilibrium`, at the requested control period."""
+    """The limit of the timestep at `equilibrium`, at the requested control period."""
     timestep_limit_held: float | None
     """At `equilibrium`, with the effort held over the step, as the live arm does."""
     timestep_limit_continuous: float | None

@@ -116,7 +116,7 @@ fn figure(section: &mut Section, headline: &str, swings: [Swing; 3], duration: f
         "Free swings from rest at a timestep of 1 ms, whose energy should stay constant. The regular one starts 0.3 rad \
          from hanging. The scale is the arm's largest change \
          of potential energy plus its kinetic energy at the start. A line that ends early is a run that diverged. \
-         Implicit midpoint is a baseline of this report: it is symplectic, and its error does not grow with time.",
+         Implicit midpoint is a baseline of this report: it is symplectic, and on the regular swing its error does not grow with time.",
         &panels,
     );
 }

@@ -256,7 +256,7 @@ fn findings(section: &mut Section, data: &[Data]) {
     let at = |method| held.and_then(|held| held.of(method).find(|run| run.outcome.steps == 2048));
     if let (Some(rk4), Some(verlet)) = (at(Method::Rk4), at(Method::Verlet)) {
         section.findings.push(format!(
-            "**With an effort that is held for each step, RK4 is no better than Verlet**. Against a law \
+            "**On a reach with an effort that is held for each step, RK4 is no better than Verlet**. Against a law \
              that acts at every instant, RK4 is {} rad off and Verlet {} rad. The motion is {REACH}, at a timestep of {}.",
             scientific(rk4.outcome.error),
             scientific(verlet.outcome.error),

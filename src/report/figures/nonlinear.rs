@@ -153,8 +153,8 @@ fn floquet(section: &mut Section) {
                 *(if is_unstable { &mut unstable } else { &mut stable }) = middle;
             }
             format!(
-                "{swing} up to {} rad at the first joint**. In it both links turn to the same side. Beyond, a \
-                 deviation grows in every period ({}-fold at {} rad), so no method is accurate for long.",
+                "{swing} up to {} rad at the first joint**. In it both links turn to the same side. A \
+                 deviation grows {}-fold in a period at {} rad, so there no method is accurate for long.",
                 number((100.0 * stable).floor() / 100.0),
                 number(multiplier),
                 number(*last),

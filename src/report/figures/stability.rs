@@ -110,7 +110,7 @@ fn map(section: &mut Section) {
          power of 3/2: the same motion, faster). The live arm holds the effort. Lines: the predicted limit. Marks: the smallest timestep at which a \
          small deviation of the arm itself grew, for each method in one of four rows of cells. Methods whose limits \
          are equal have one line. In the lowest rows the gains are too low to hold the arm against gravity, and no \
-         timestep is stable. A cell counts as too slow to judge if by the prediction its slowest mode changes its \
+         timestep of the map is stable. A cell counts as too slow to judge if by the prediction its slowest mode changes its \
          energy by less than a factor e in the 4000 simulated steps.",
         &panels,
     );
@@ -210,7 +210,7 @@ fn control_period(section: &mut Section) {
         ),
         "2 links at (0.4, 0.8), default gains, effort held over the period. Curves: spectral radius of one control period of the \
          linearised loop. Dots: the growth of a small deviation of the arm itself per period, over 4000 periods. The \
-         largest stable control period is where a curve crosses 1: shorter steps do not increase it. With \
+         limit of the control period is where a curve first crosses 1. From order 2 on shorter steps hardly change it. With \
          Euler the growth depends on the steps per period.",
         &panels,
     );

@@ -93,7 +93,7 @@ fn finding(costs: &[Cost]) -> Option<String> {
         "**A 2-link swing of {DURATION} s from (0.4, -0.3), with a brake at the elbow {} times as fast as the swing, \
          costs Rodas3 {} evaluations within {} rad of the true motion, and RK4 at least {}**. Rodas3 is an implicit \
          method and a baseline of the report. RK4 is explicit and needs as many to be stable. From a ratio of {} on \
-         an implicit method takes the least time.",
+         an implicit method took the least time here.",
         power(rk4.ratio.log10()),
         implicit.evaluations,
         power(TARGET.log10()),

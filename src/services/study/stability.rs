@@ -3,7 +3,7 @@
 //! The present gains count, even if the controller is off. Gains of zero examine the free arm. The motion is the
 //! coming motion of the present arm.
 //!
-//! **Invariant:** a limit is missing if nothing limits the timestep, and 0 if no timestep is stable.
+//! **Invariant:** a limit is missing if no unstable timestep was found, and 0 if no stable one was found.
 
 use bytes::Bytes;
 use serde::Serialize;
