@@ -82,8 +82,8 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   const usual = free ? SHARE * inForce : Math.min(afterReset(answer), SHARE * motion);
   return {
     limit: inForce,
-    // A motion's limit is that of the fastest motion with its energy, so it is no more than safe.
-    name: moving ? "the safe limit" : "the limit",
+    // A motion's limit is an estimate for the fastest motion with its energy.
+    name: moving ? "the estimated limit" : "the limit",
     where: moving ? `moving at up to ${significant(speed ?? NaN, 3)} rad/s` : place,
     place,
     everyPose: Math.min(motion, everyPoseAtRest),

@@ -61,7 +61,7 @@ function showLimit() {
 function growthText() {
   const { method, timestep } = state.integrator;
   const seconds = doublingTime(method, timestep, answerInForce(state));
-  return seconds > 0 ? `The energy of a small swing doubles every ${significant(seconds, 2)} s.` : "";
+  return seconds > 0 ? `The energy of the fastest small swing doubles every ${significant(seconds, 2)} s.` : "";
 }
 
 /** The arm in a sentence for screen readers, read when the view has the focus. */

@@ -43,7 +43,7 @@ const VERDICTS = [
   ["within the limit of every pose", {}, { kind: "stable" }],
   ["within the limit of this pose alone", at(0.006), { kind: "here", sentence: /at the setpoint \(0\.90, −1\.30\) rad, but other poses are stable only up to 4\.32 ms/, advised: ADVISED }],
   ["beyond the limit", at(0.02), { kind: "beyond", sentence: /20 ms is above .* 13\.6 ms, at the setpoint/ }],
-  ["a motion with a smaller limit than the pose", at(0.006, served({ timestep_limit_motion: 0.004, motion_speed: 12.5, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" })), { kind: "beyond", pill: "beyond the safe limit", where: /^moving at up to 12\.5 rad\/s$/ }],
+  ["a motion with a smaller limit than the pose", at(0.006, served({ timestep_limit_motion: 0.004, motion_speed: 12.5, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" })), { kind: "beyond", pill: "beyond the estimated limit", where: /^moving at up to 12\.5 rad\/s$/ }],
   ["a pose that the arm sags to", served({ equilibrium: [0.5, -1.4], equilibrium_kind: "sagging" }), { where: /^at the pose to which it sags, \(0\.50, −1\.40\) rad$/ }],
   ["Euler's free swing", { enabled: false, ...served({ timestep_limit_held: 0, advised_timestep: 0, minimum_over_poses_held: 0 }) }, { kind: "never", advised: NaN }],
   ["nothing that limits", { enabled: false, stability: Object.fromEntries(Object.keys(VALUES).map((key) => [key, null])) }, { kind: "stable", limit: Infinity }],
@@ -91,7 +91,7 @@ const TWO_CLOCKS = { ...VALUES, timestep_limit: 0.08, timestep_limit_held: 0.08,
 test("the motion limits the timestep, not the control period", () => {
   assert.match(verdict(sampled(0.05, { stability: TWO_CLOCKS })).sentence, /^A control period of 50 ms is within the limit 104 ms, at the setpoint/);
   const coarse = verdict(sampled(0.05, { stability: TWO_CLOCKS, ...at(0.025) }));
-  assert.match(coarse.sentence, /^25 ms is above the safe limit 18 ms, moving at up to 22 rad\/s/);
+  assert.match(coarse.sentence, /^25 ms is above the estimated limit 18 ms, moving at up to 22 rad\/s/);
   assert.deepEqual([coarse.kind, coarse.slow, coarse.advised < 0.018], ["beyond", false, true]);
   const shaking = sampled(0.2, { stability: { ...TWO_CLOCKS, timestep_limit: 0 } });
   assert.match(limitInForce(shaking).where, /^at the setpoint/, "its speed is that of the shaking");
@@ -142,7 +142,7 @@ test("after a divergence the earlier limit of the motion counts, and the advice 
   const known = swing("verlet", 0.1, { ...diverged, motions: { verlet: { limit: 0.0488, speed: 16.4 } } });
   assert.deepEqual([limitInForce(known).limit, verdict(known).kind], [0.0488, "diverged"]);
   assert.equal(verdict(known).advised, 0.8 * 0.0488);
-  assert.match(verdict(known).sentence, /100 ms is above the safe limit 48\.8 ms, moving at up to 16\.4 rad\/s/);
+  assert.match(verdict(known).sentence, /100 ms is above the estimated limit 48\.8 ms, moving at up to 16\.4 rad\/s/);
   const unknown = swing("verlet", 0.1, diverged);
   assert.equal(verdict(unknown).advised, 0.05);
 });

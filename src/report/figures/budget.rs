@@ -100,7 +100,7 @@ fn findings(section: &mut Section, held: &[Vec<Parts>]) {
     section.findings.push(format!(
         "**At a timestep and control period of {period}, {REACH} is off by {} rad because the effort is held, {} rad by \
          RK4's truncation and {} rad by rounding**. These are the largest of 1024 instants. The error of the hold is \
-         the distance from a law that acts at every instant. A better method hardly changes it.",
+         the distance from a law that acts at every instant. A better method does not reduce it.",
         scientific(rk4.hold),
         scientific(rk4.truncation),
         scientific(rk4.rounding)

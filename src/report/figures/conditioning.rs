@@ -78,8 +78,8 @@ pub(super) fn make(section: &mut Section) {
     section.figure(
         "conditioning",
         &format!(
-            "Bent and stretched, the recursion loses at most {} of 16 digits, and elimination of the mass matrix far \
-             more",
+            "In these states, bent or stretched, the recursion loses at most {} of 16 digits, and elimination of the \
+             mass matrix far more",
             number(straight)
         ),
         &format!("Worst of {count} random states for each mark. Links of 1 m, two of 1 kg, under gravity. The dashed line is the change of the accelerations by the last bit of an angle. An \
