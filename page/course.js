@@ -78,7 +78,7 @@ export const STEPS = [
     task: { text: "Shorten the period until the bars shrink.", done: ({ shrinks, stable }) => shrinks && stable },
     question: {
       text: "At the first period the last bars pointed up and down in turn. Why?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
-      because: "The torque is held too long. It pushes the joint past the target. At this period the pushes grow.",
+      because: "The torque is held too long. It pushes the joint past the target. At the first period the pushes grew.",
     },
   },
   {

@@ -68,7 +68,7 @@ function sheet(params, gains, answers, link) {
   const row = (/** @type {string} */ name, /** @type {string} */ value) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, value));
   const period = answers.rk4.control_period_limit ?? Infinity;
   const free = isFree(gains);
-  const reason = free ? "all gains are 0, so no controller holds this arm." : period === Infinity ? "nothing limits this arm." : cause(answers.rk4, period);
+  const reason = free ? "all gains are 0, so no controller holds this arm." : period === Infinity ? "no limit of this arm was found." : cause(answers.rk4, period);
   return [
     el("h3", {}, "My arm and its two clocks"),
     el("table", {}, el("tbody", {},

@@ -28,7 +28,7 @@ impl<F: FnMut(u64) -> bool> StepTrial for F {
     }
 }
 
-/// The fewest steps between `first` and `most`, both included, whose run is accurate enough. `part` is the resolution
+/// The fewest steps found between `first` and `most`, both included, whose run is accurate enough. `part` is the resolution
 /// of the bisection: 64 means to a 64th of the number, `u64::MAX` to a single step.
 pub async fn fewest(first: u64, most: u64, part: u64, mut trial: impl StepTrial) -> Option<u64> {
     let first = first.max(1);

@@ -8,7 +8,7 @@
 //!
 //! The reference of a law that acts at every instant is a run of Runge-Kutta 4, refined with smaller steps until two of
 //! them agree to a part of the allowed error. The others are those of a rollout, known to rounding. Each method is then
-//! simulated like the live arm and compared with the reference. A search ([`fewest`]) finds the fewest steps with which
+//! simulated like the live arm and compared with the reference. A search ([`fewest`]) looks for the fewest steps with which
 //! it stays within the rest of the error after every step. The plan is the cheapest run, in evaluations of the
 //! dynamics, and its error is measured. Runs that cannot be cheaper are skipped.
 //!

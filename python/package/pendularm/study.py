@@ -136,7 +136,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class SuggestedGains:
-    """Gains that are stable in every pose and settle in time, with their results."""
+    """Gains with which every pose is predicted stable and ten moves settle in time, with their results."""
 
     kp: Floats
     """[N m/rad], (links,)."""
