@@ -9,7 +9,7 @@ import { duration, fixed, methodName, METHODS, significant } from "./format.js";
  * @property {Kind} kind
  * @property {string} pill a few words
  * @property {string} sentence all of it
- * @property {number} limit largest stable timestep [s]: 0 none, Infinity any, NaN unknown
+ * @property {number} limit limit of the timestep [s]: 0 if no stable one was found, Infinity if no limit was, NaN unknown
  * @property {number} advised timestep to offer [s]; NaN if there is none
  * @property {string} where the pose or speed of the limit
  * @property {boolean} slow whether the verdict is for a control period longer than the timestep
@@ -119,7 +119,7 @@ export function doublingTime(/** @type {string} */ method, /** @type {number} */
   return (Math.LN2 * timestep) / Math.log1p(method === "euler" ? z * z : z ** 4 / 4);
 }
 
-/** The largest stable control period [s]: 0 none, Infinity any, NaN unknown, as while no controller acts. */
+/** The limit of the control period [s]: 0 if no stable one was found, Infinity if no limit was, NaN unknown, as while no controller acts. */
 export function controlPeriodLimit(/** @type {any} */ state) {
   const answer = answerInForce(state);
   return answer && acts(state) ? periodLimitIn(state, answer) : NaN;
