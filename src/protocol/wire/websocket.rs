@@ -1,10 +1,11 @@
 //! Frames of a WebSocket (RFC 6455, section 5): bytes into messages, and back. The result of reading does not depend on
 //! how the stream is divided into chunks.
 //!
-//! A message longer than the limit becomes one error, and the rest of it is skipped. Pings are answered by the latest
-//! pong, as section 5.5.3 allows.
+//! A message longer than the limit becomes one error, and the rest of it is skipped. Only the latest ping is answered, as
+//! section 5.5.3 allows. A close frame is answered with the same code.
 //!
-//! **Invariant:** at most one incomplete message, the last chunk and the messages read ahead are kept.
+//! **Invariant:** at most one incomplete message, the last chunk and the messages read ahead are kept. The output has
+//! at most one part of the messages, one pong and one close frame.
 
 use std::collections::VecDeque;
 
@@ -36,6 +37,16 @@ const RESERVED: u8 = 0x70;
 const MASKED: u8 = 0x80;
 /// Longest payload of a control frame.
 const MAX_CONTROL: usize = 125;
+/// Bytes of messages in one part of the output. A longer message is sent in fragments, so that the client's progress is
+/// measurable.
+const FRAGMENT: usize = 32 * 1024;
+
+/// Codes of close frames.
+const GOING_AWAY: u16 = 1001;
+const PROTOCOL_ERROR: u16 = 1002;
+const POLICY_VIOLATION: u16 = 1008;
+
+// ---- input ----------------------------------------------------------------------------------------------------------
 
 /// Why no more messages follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -276,6 +287,135 @@ fn unmask(payload: &mut [u8], mask: &mut [u8; 4]) {
     }
     let used = rest.len();
     mask.rotate_left(used);
+}
+
+// ---- output ---------------------------------------------------------------------------------------------------------
+
+/// Makes frames of messages, pongs and the close frame.
+///
+/// [`put`](Self::put) messages, write the [`output`](Self::output), and report each write to [`sent`](Self::sent).
+#[derive(Debug, Default)]
+pub struct MessageWriter {
+    /// Bytes that are to be sent.
+    output: BytesMut,
+    /// The kind of the message that the next output continues, if there is one.
+    unfinished: Option<u8>,
+    /// Bytes of messages in `output`, as they were put.
+    unsent: usize,
+    /// The code and the reason in the close frame. By default it says that the server shuts down.
+    close_reason: Option<(Option<u16>, &'static str)>,
+    /// The close frame has been put.
+    is_closing: bool,
+}
+
+impl MessageWriter {
+    /// The bytes that are to be sent next.
+    #[must_use]
+    pub const fn output(&self) -> &BytesMut {
+        &self.output
+    }
+
+    /// Whether the output has a part of the messages.
+    #[must_use]
+    pub const fn has_messages(&self) -> bool {
+        self.unsent > 0
+    }
+
+    /// Notes that `bytes` of the output were sent. At the end of the output, returns the bytes of messages in it.
+    /// Before that, returns 0.
+    pub fn sent(&mut self, bytes: usize) -> usize {
+        self.output.advance(bytes);
+        if self.output.is_empty() {
+            std::mem::take(&mut self.unsent)
+        } else {
+            0
+        }
+    }
+
+    /// Puts a part of `messages` into the output: several whole messages, or a fragment of the first one. The next call
+    /// continues after it.
+    pub fn put<'a>(&mut self, messages: impl Iterator<Item = &'a Bytes>) {
+        for message in messages {
+            let mut rest = message.as_ref();
+            while !rest.is_empty() {
+                let room = FRAGMENT.saturating_sub(self.unsent);
+                let kind = self.unfinished.unwrap_or_else(|| kind_of(rest));
+                let (piece, taken, is_last) = first_piece(rest, kind == opcode::TEXT, room);
+                if self.unsent > 0 && !is_last {
+                    return;
+                }
+                self.unsent += taken;
+                rest.advance(taken);
+                let opcode = match self.unfinished {
+                    Some(_) => opcode::CONTINUATION,
+                    None => kind,
+                };
+                self.unfinished = (!is_last).then_some(kind);
+                append_frame(&mut self.output, opcode, is_last, piece);
+                if !is_last {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Puts the answer to a ping, unless the close frame has been put.
+    pub fn put_pong(&mut self, ping: &[u8]) {
+        if !self.is_closing {
+            append_frame(&mut self.output, opcode::PONG, true, ping);
+        }
+    }
+
+    /// Puts the close frame, once.
+    pub fn put_close(&mut self) {
+        if self.is_closing {
+            return;
+        }
+        self.is_closing = true;
+        let shutdown = (Some(GOING_AWAY), "shutting down");
+        let (code, why) = self.close_reason.unwrap_or(shutdown);
+        let code = code.map(u16::to_be_bytes);
+        let mut payload = code.into_iter().flatten().collect::<Vec<u8>>();
+        payload.extend_from_slice(why.as_bytes());
+        append_frame(&mut self.output, opcode::CLOSE, true, &payload);
+    }
+
+    /// Makes the close frame the answer to this end.
+    pub const fn answer(&mut self, end: SocketEnd) {
+        self.close_reason = Some(match end {
+            SocketEnd::Closed(code) => (code, ""),
+            SocketEnd::Violated => (Some(PROTOCOL_ERROR), "violates RFC 6455"),
+        });
+    }
+
+    /// Makes `why` the reason in the close frame, for a peer that breaks a rule of the server.
+    pub const fn refuse(&mut self, why: &'static str) {
+        self.close_reason = Some((Some(POLICY_VIOLATION), why));
+    }
+}
+
+/// The kind of a message: JSON begins with a brace, CBOR never does.
+fn kind_of(message: &[u8]) -> u8 {
+    if message.first() == Some(&b'{') {
+        opcode::TEXT
+    } else {
+        opcode::BINARY
+    }
+}
+
+/// The part of `bytes` that fits into one frame, the number of `bytes` that it takes, and whether a message ends there. A
+/// text may be several messages, one per line. The end of a line is not sent.
+fn first_piece(bytes: &[u8], is_text: bool, room: usize) -> (&[u8], usize, bool) {
+    let offered = bytes.get(..room).unwrap_or(bytes);
+    let end = || offered.iter().position(|&byte| byte == b'\n');
+    let line = is_text
+        .then(end)
+        .flatten()
+        .and_then(|end| offered.get(..end));
+    line.map_or(
+        (offered, offered.len(), offered.len() == bytes.len()),
+        |line| (line, line.len() + 1, true),
+    )
 }
 
 /// Appends a frame to `out`, as a server sends it.

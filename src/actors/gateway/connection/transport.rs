@@ -10,22 +10,13 @@ use std::ops::Deref;
 use std::pin::{Pin, pin};
 use std::task::{Context, Poll, ready};
 
-use bytes::{Buf, BufMut, Bytes, BytesMut};
+use bytes::{BufMut, Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
 
 use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, READ_BYTES, WRITE_BYTES, WRITE_FRAMES};
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::wire::frame::{FrameError, FramePart, FrameReader};
-use crate::protocol::wire::websocket::{MessageReader, SocketEnd, append_frame, opcode};
-
-/// Bytes of payload in one WebSocket frame and in one write. A longer message is sent in fragments, so that the
-/// client's progress is measurable.
-const FRAGMENT: usize = 32 * 1024;
-
-/// Codes of close frames.
-const GOING_AWAY: u16 = 1001;
-const PROTOCOL_ERROR: u16 = 1002;
-const POLICY_VIOLATION: u16 = 1008;
+use crate::protocol::wire::websocket::{MessageReader, MessageWriter, SocketEnd};
 
 /// Why a client can no longer be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,7 +60,7 @@ impl<S: ClientStream> Transport<S> {
     /// A stream after the handshake of a WebSocket.
     #[cfg(feature = "web")]
     pub(super) fn socket(stream: S) -> Self {
-        let protocol = Protocol::WebSocket(Box::new(WebSocket::new()), Web);
+        let protocol = Protocol::WebSocket(Box::default(), Web);
         Self { stream, protocol }
     }
 
@@ -90,7 +81,7 @@ impl<S: ClientStream> Transport<S> {
         let read = ready!(pin!(read_some(&mut self.stream, chunk)).poll(cx));
         Poll::Ready(match (read, &mut self.protocol) {
             (Err(_), _) => Err(ClientLost::Gone),
-            (Ok(0), Protocol::WebSocket(socket, _)) => Err(socket.violated()),
+            (Ok(0), Protocol::WebSocket(socket, _)) => Err(socket.lost(SocketEnd::Violated)),
             (Ok(bytes), _) => Ok(bytes),
         })
     }
@@ -99,7 +90,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn push(&mut self, chunk: &[u8]) {
         match &mut self.protocol {
             Protocol::Plain(frames) => frames.push(chunk),
-            Protocol::WebSocket(socket, _) => socket.messages.push(chunk),
+            Protocol::WebSocket(socket, _) => socket.incoming.push(chunk),
         }
     }
 
@@ -107,7 +98,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn cut(&mut self) -> Result<Option<FramePart>, ClientLost> {
         match &mut self.protocol {
             Protocol::Plain(frames) => Ok(frames.cut()),
-            Protocol::WebSocket(socket, _) => match socket.messages.cut() {
+            Protocol::WebSocket(socket, _) => match socket.incoming.cut() {
                 Some(part) => Ok(Some(part)),
                 None => socket.check_end().map(|()| None),
             },
@@ -120,9 +111,9 @@ impl<S: ClientStream> Transport<S> {
         let Protocol::WebSocket(socket, _) = &mut self.protocol else {
             return Ok(());
         };
-        socket.messages.push(chunk);
+        socket.incoming.push(chunk);
         chunk.clear();
-        socket.messages.look_ahead(FRAMES_IN_A_ROW);
+        socket.incoming.look_ahead(FRAMES_IN_A_ROW);
         socket.check_end()
     }
 
@@ -130,7 +121,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn taken_ahead(&self) -> usize {
         match &self.protocol {
             Protocol::Plain(_) => 0,
-            Protocol::WebSocket(socket, _) => socket.messages.waiting(),
+            Protocol::WebSocket(socket, _) => socket.incoming.waiting(),
         }
     }
 
@@ -138,7 +129,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn is_unfinished(&self) -> bool {
         match &self.protocol {
             Protocol::Plain(frames) => frames.is_unfinished(),
-            Protocol::WebSocket(socket, _) => socket.messages.is_unfinished(),
+            Protocol::WebSocket(socket, _) => socket.incoming.is_unfinished(),
         }
     }
 
@@ -146,7 +137,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn is_long_coming(&self) -> bool {
         let buffered = match &self.protocol {
             Protocol::Plain(frames) => frames.buffered(),
-            Protocol::WebSocket(socket, _) => socket.messages.buffered(),
+            Protocol::WebSocket(socket, _) => socket.incoming.buffered(),
         };
         buffered > MEDIUM && self.is_unfinished()
     }
@@ -163,7 +154,10 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn give_up(&mut self, why: &'static str) -> Result<(), ClientLost> {
         match &mut self.protocol {
             Protocol::Plain(_) => Ok(()),
-            Protocol::WebSocket(socket, _) => Err(socket.refuse(POLICY_VIOLATION, why)),
+            Protocol::WebSocket(socket, _) => {
+                socket.outgoing.refuse(why);
+                Err(ClientLost::Refused)
+            }
         }
     }
 
@@ -250,131 +244,71 @@ fn write_some<'a, S: AsyncWrite + Unpin, B: Deref<Target = [u8]> + 'a>(
 
 // ---- a WebSocket: a message is a frame ------------------------------------------------------------------------------
 
-/// The state of a WebSocket.
+/// The two directions of a WebSocket.
+#[derive(Default)]
 struct WebSocket {
-    /// The incoming messages.
-    messages: MessageReader,
-    /// Frames that are being written.
-    output: BytesMut,
-    /// The kind of the message that the next write continues, if there is one.
-    unfinished: Option<u8>,
-    /// Bytes of the writer's frames in `output`.
-    unflushed: usize,
-    /// The close reason for the peer.
-    close_reason: (Option<u16>, &'static str),
-    /// The peer has closed, and accepts only a close frame.
-    is_closed: bool,
-    /// The close frame has been queued.
-    is_closing: bool,
+    incoming: MessageReader,
+    outgoing: MessageWriter,
 }
 
 impl WebSocket {
-    fn new() -> Self {
-        Self {
-            messages: MessageReader::default(),
-            output: BytesMut::new(),
-            unfinished: None,
-            unflushed: 0,
-            close_reason: (Some(GOING_AWAY), "shutting down"),
-            is_closed: false,
-            is_closing: false,
-        }
-    }
-
     fn check_end(&mut self) -> Result<(), ClientLost> {
-        match self.messages.end() {
-            None => Ok(()),
-            Some(SocketEnd::Closed(code)) => {
-                self.close_reason = (code, "");
-                self.is_closed = true;
-                Err(ClientLost::Gone)
-            }
-            Some(SocketEnd::Violated) => Err(self.violated()),
+        self.incoming
+            .end()
+            .map_or(Ok(()), |end| Err(self.lost(end)))
+    }
+
+    /// Why the client is lost after this end, which the close frame answers.
+    const fn lost(&mut self, end: SocketEnd) -> ClientLost {
+        self.outgoing.answer(end);
+        match end {
+            SocketEnd::Closed(_) => ClientLost::Gone,
+            SocketEnd::Violated => ClientLost::Refused,
         }
     }
 
-    /// Refuses the peer, which has violated the protocol.
-    const fn violated(&mut self) -> ClientLost {
-        self.refuse(PROTOCOL_ERROR, "violates RFC 6455")
-    }
-
-    /// Refuses the peer. The close frame has the code and the reason.
-    const fn refuse(&mut self, code: u16, why: &'static str) -> ClientLost {
-        self.close_reason = (Some(code), why);
-        ClientLost::Refused
-    }
-
+    /// A peer that has closed gets only a close frame.
     fn poll_write<'a, S: AsyncWrite + Unpin>(
         &mut self,
         stream: &mut S,
         cx: &mut Context<'_>,
         frames: impl Iterator<Item = &'a Bytes>,
     ) -> Poll<io::Result<usize>> {
-        if self.is_closed {
+        if let Some(SocketEnd::Closed(_)) = self.incoming.end() {
             ready!(self.poll_close(stream, cx))?;
             return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
         }
-        if self.unflushed == 0 {
+        if !self.outgoing.has_messages() {
             ready!(self.poll_flush(stream, cx))?;
-            self.unflushed = self.put_frames(frames);
+            self.outgoing.put(frames);
         }
-        ready!(self.poll_output(stream, cx))?;
-        if !self.output.is_empty() {
-            return Poll::Ready(Ok(0));
-        }
-        Poll::Ready(Ok(std::mem::take(&mut self.unflushed)))
+        self.poll_output(stream, cx)
     }
 
-    /// Sends a part of the queued frames.
+    /// Sends a part of the output. Returns the bytes of the writer's frames that are sent with it.
     fn poll_output<S: AsyncWrite + Unpin>(
         &mut self,
         stream: &mut S,
         cx: &mut Context<'_>,
-    ) -> Poll<io::Result<()>> {
-        let sent = ready!(write_some(stream, cx, once(&self.output)))?;
-        self.output.advance(sent);
-        Poll::Ready(Ok(()))
+    ) -> Poll<io::Result<usize>> {
+        let sent = ready!(write_some(stream, cx, once(self.outgoing.output())))?;
+        Poll::Ready(Ok(self.outgoing.sent(sent)))
     }
 
-    fn put_frames<'a>(&mut self, frames: impl Iterator<Item = &'a Bytes>) -> usize {
-        let mut written = 0;
-        for frame in frames {
-            let mut rest = frame.as_ref();
-            while !rest.is_empty() {
-                let room = FRAGMENT.saturating_sub(written);
-                let kind = self.unfinished.unwrap_or_else(|| kind_of(rest));
-                let (piece, taken, is_last) = first_piece(rest, kind == opcode::TEXT, room);
-                if written > 0 && !is_last {
-                    return written;
-                }
-                written += taken;
-                rest.advance(taken);
-                let opcode = match self.unfinished {
-                    Some(_) => opcode::CONTINUATION,
-                    None => kind,
-                };
-                self.unfinished = (!is_last).then_some(kind);
-                append_frame(&mut self.output, opcode, is_last, piece);
-                if !is_last {
-                    return written;
-                }
-            }
-        }
-        written
-    }
-
-    /// Sends queued frames, and the answer to the latest ping.
+    /// Sends the output, and the answer to the latest ping.
     fn poll_flush<S: AsyncWrite + Unpin>(
         &mut self,
         stream: &mut S,
         cx: &mut Context<'_>,
     ) -> Poll<io::Result<()>> {
         loop {
-            if self.output.is_empty() {
-                match self.messages.take_ping().filter(|_| !self.is_closing) {
-                    Some(ping) => append_frame(&mut self.output, opcode::PONG, true, &ping),
-                    None => return Poll::Ready(Ok(())),
-                }
+            if self.outgoing.output().is_empty()
+                && let Some(ping) = self.incoming.take_ping()
+            {
+                self.outgoing.put_pong(&ping);
+            }
+            if self.outgoing.output().is_empty() {
+                return Poll::Ready(Ok(()));
             }
             ready!(self.poll_output(stream, cx))?;
         }
@@ -387,39 +321,7 @@ impl WebSocket {
         cx: &mut Context<'_>,
     ) -> Poll<io::Result<()>> {
         ready!(self.poll_flush(stream, cx))?;
-        if self.is_closing {
-            return Poll::Ready(Ok(()));
-        }
-        let (code, why) = self.close_reason;
-        let code = code.map(u16::to_be_bytes);
-        let mut payload = code.into_iter().flatten().collect::<Vec<u8>>();
-        payload.extend_from_slice(why.as_bytes());
-        append_frame(&mut self.output, opcode::CLOSE, true, &payload);
-        self.is_closing = true;
+        self.outgoing.put_close();
         self.poll_flush(stream, cx)
     }
-}
-
-/// The kind of a frame: JSON begins with a brace, CBOR never does.
-fn kind_of(frame: &[u8]) -> u8 {
-    if frame.first() == Some(&b'{') {
-        opcode::TEXT
-    } else {
-        opcode::BINARY
-    }
-}
-
-/// The part of a frame that fits into one WebSocket frame, the bytes that it takes from the frame, and whether a message
-/// ends there. A text may be several messages, one per line. The end of a line is not sent.
-fn first_piece(frame: &[u8], is_text: bool, room: usize) -> (&[u8], usize, bool) {
-    let offered = frame.get(..room).unwrap_or(frame);
-    let end = || offered.iter().position(|&byte| byte == b'\n');
-    let line = is_text
-        .then(end)
-        .flatten()
-        .and_then(|end| offered.get(..end));
-    line.map_or(
-        (offered, offered.len(), offered.len() == frame.len()),
-        |line| (line, line.len() + 1, true),
-    )
 }
