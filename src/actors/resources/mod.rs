@@ -1,4 +1,5 @@
-//! Shared resources of all nodes: counted memory, measured work time, and threads for long work.
+//! Shared resources of all nodes: counted memory, measured work time, threads for long work, and questions to the
+//! operating system.
 //!
 //! **Invariant:** nothing here imports a node, so every node can use it.
 
@@ -7,4 +8,5 @@ pub mod long_work;
 pub mod memory;
 pub mod priority;
 pub mod turns;
+pub mod unread;
 pub mod work_clock;

@@ -18,7 +18,7 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::flow::{Ends, FRESH, FlowControl, UnreadSource};
+use super::flow::{FRESH, FlowControl, UnreadSource};
 use super::session::HeldPlace;
 use super::transport::{ClientLost, ClientStream, Transport};
 use crate::actors::gateway::limits::{
@@ -29,6 +29,7 @@ use crate::actors::panics::{Contained, contain};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::SHORT;
 use crate::actors::resources::turns::{Timer, end_turn};
+use crate::actors::resources::unread::Ends;
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::outbox::{MAX_AGE, Outbox};

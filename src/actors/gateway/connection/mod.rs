@@ -31,7 +31,7 @@ use actix::prelude::*;
 use self::admission::Admission;
 use self::client::ClientWriter;
 pub use self::client::Connection;
-pub use self::flow::{Ends, UnreadSource};
+pub use self::flow::UnreadSource;
 use self::reader::{ClientReader, Discarder};
 use self::session::{ClientSession, Opened};
 pub use self::transport::ClientStream;
@@ -39,6 +39,8 @@ use super::limits::DISCARD_TIME;
 use super::registry::{Outlets, Registry};
 use crate::actors::panics::contained;
 use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::unread;
+pub use crate::actors::resources::unread::Ends;
 
 impl<S: ClientStream> Connection<S> {
     /// Starts the actor for `stream` in the current system. It requires no token.
@@ -55,7 +57,7 @@ impl<S: ClientStream> Connection<S> {
         gauges: Arc<Gauges>,
     ) -> Addr<Self> {
         let ends = ends.into();
-        let unread = flow::between(ends);
+        let unread = Box::new(unread::source(ends));
         Self::start_reading(unread, admission, ends, stream, registry, gauges)
     }
 

@@ -17,7 +17,6 @@ use tokio::time::error::Elapsed;
 use tokio::time::{Instant, sleep, timeout};
 
 use super::client::Connection;
-use super::flow::{Ends, has_closed};
 use super::transport::{ClientLost, ClientStream};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{
@@ -28,6 +27,7 @@ use crate::actors::gateway::registry::{Handled, Request, Retire};
 use crate::actors::resources::long_work::{SHORT_WORK, WorkKind, run_long_work};
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
 use crate::actors::resources::turns::{Timer, end_turn};
+use crate::actors::resources::unread::{Ends, has_closed};
 use crate::protocol::catalog::Service;
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::op::{

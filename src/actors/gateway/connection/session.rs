@@ -14,13 +14,13 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 use super::admission::{
     Admission, AuthError, HeldSlot, WRONG_TOKEN_TIME, authenticate, first_frame, is_command,
 };
-use super::flow::Ends;
 use super::transport::{ClientStream, Transport};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{FRAME_TIME, HEAD_TIME, LOOK_AGAIN, OPENING_TIME, READ_BYTES};
 use crate::actors::gateway::registry::{
     Connect, CountRefusal, Disconnect, Outlets, Refused, Registry,
 };
+use crate::actors::resources::unread::Ends;
 use crate::protocol::messages::{self, Level};
 #[cfg(feature = "web")]
 use crate::protocol::wire::frame::Foreign;
