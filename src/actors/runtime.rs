@@ -19,9 +19,8 @@ use tokio::time::{Instant, sleep, timeout_at};
 
 use crate::actors::arm::sim::ArmSim;
 use crate::actors::compute::workers::WorkerPool;
-use crate::actors::gateway::connection::admission::{Admission, Slots};
+use crate::actors::gateway::connection::admission::{Admission, MAX_NEWCOMERS, Slots};
 use crate::actors::gateway::listener;
-use crate::actors::gateway::open_files;
 use crate::actors::gateway::registry::{Attach, FinishAll, RefuseCalls, Registry};
 use crate::actors::node::{Nodes, ShutDown};
 use crate::actors::panics::contain;
@@ -29,6 +28,7 @@ use crate::actors::panics::contain;
 use crate::actors::recorder::{self, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::long_work::THREADS;
+use crate::actors::resources::open_files::{Room, make_room};
 use crate::actors::resources::priority::lower_priority;
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::start;
@@ -112,7 +112,11 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
         .and_then(|socket| socket.local_addr().ok())
         .unwrap_or(options.bind);
 
-    let room = open_files::make_room(options.clients, options.token.is_some());
+    let wanted = Room {
+        clients: options.clients,
+        newcomers: MAX_NEWCOMERS,
+    };
+    let room = make_room(wanted, options.token.is_some());
     let gauges = Arc::<Gauges>::default();
     let registry = Registry::new(Arc::clone(&gauges))
         .serving_at_most(room.clients)

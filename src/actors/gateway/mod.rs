@@ -5,5 +5,4 @@
 pub mod connection;
 pub mod limits;
 pub mod listener;
-pub mod open_files;
 pub mod registry;

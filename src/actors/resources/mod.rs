@@ -6,6 +6,7 @@
 pub mod gauges;
 pub mod long_work;
 pub mod memory;
+pub mod open_files;
 pub mod priority;
 pub mod turns;
 pub mod unread;

@@ -5,11 +5,9 @@
 //!
 //! **Invariant:** the served clients never use all files that may be open.
 
-use super::connection::admission::MAX_NEWCOMERS;
-
 /// Files for everything but served clients: standard streams, polls, wakers, signals, listening sockets, a file of a
 /// report, and clients that are being refused.
-pub const OTHER_FILES: usize = 32;
+const OTHER_FILES: usize = 32;
 /// Additional files, so that many clients can be refused at once.
 const REFUSED_AT_ONCE: usize = 480;
 
@@ -22,19 +20,19 @@ pub struct Room {
     pub newcomers: usize,
 }
 
-/// Raises the limit of open files as far as `wanted_clients` need and the system allows. Returns the number of possible
-/// connections, and logs a warning if the limit reduces it.
+/// Raises the limit of open files as far as the `wanted` connections need and the system allows. Returns the number of
+/// possible connections, and logs a warning if the limit reduces the clients.
 #[must_use]
-pub fn make_room(wanted_clients: usize, asks_token: bool) -> Room {
-    let wanted = wanted_clients + MAX_NEWCOMERS + OTHER_FILES + REFUSED_AT_ONCE;
+pub fn make_room(wanted: Room, asks_token: bool) -> Room {
+    let needed = wanted.clients + wanted.newcomers + OTHER_FILES + REFUSED_AT_ONCE;
     // The limit is never lowered.
-    let files = raise_limit(wanted).unwrap_or_else(|error| {
+    let files = raise_limit(needed).unwrap_or_else(|error| {
         tracing::warn!(%error, "the limit of open files is unknown");
         usize::MAX
     });
-    let room = room_with(files, wanted_clients, asks_token);
+    let room = room_with(files, wanted, asks_token);
     let clients = room.clients;
-    if clients < wanted_clients {
+    if clients < wanted.clients {
         tracing::warn!(
             files,
             clients,
@@ -44,10 +42,10 @@ pub fn make_room(wanted_clients: usize, asks_token: bool) -> Room {
     room
 }
 
-/// Raises the limit to `wanted` or the largest allowed value. Returns the new limit.
+/// Raises the limit to `needed` or the largest allowed value. Returns the new limit.
 #[cfg(unix)]
-fn raise_limit(wanted: usize) -> std::io::Result<usize> {
-    let files = rlimit::increase_nofile_limit(wanted as u64)?;
+fn raise_limit(needed: usize) -> std::io::Result<usize> {
+    let files = rlimit::increase_nofile_limit(needed as u64)?;
     Ok(usize::try_from(files).unwrap_or(usize::MAX))
 }
 
@@ -59,19 +57,18 @@ fn raise_limit(_: usize) -> std::io::Result<usize> {
 
 /// Returns the places that `files` open files allow, for at least one client. If a token is required and files are few,
 /// newcomers get half of the files.
-#[must_use]
-pub fn room_with(files: usize, wanted_clients: usize, asks_token: bool) -> Room {
+fn room_with(files: usize, wanted: Room, asks_token: bool) -> Room {
     let files = files.saturating_sub(OTHER_FILES);
     let newcomers = if asks_token {
-        (files / 2).clamp(1, MAX_NEWCOMERS)
+        (files / 2).clamp(1, wanted.newcomers.max(1))
     } else {
-        MAX_NEWCOMERS
+        wanted.newcomers
     };
     let kept_for_them = if asks_token { newcomers } else { 0 };
     Room {
         clients: files
             .saturating_sub(kept_for_them)
-            .clamp(1, wanted_clients.max(1)),
+            .clamp(1, wanted.clients.max(1)),
         newcomers,
     }
 }
@@ -79,12 +76,17 @@ pub fn room_with(files: usize, wanted_clients: usize, asks_token: bool) -> Room 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::actors::gateway::connection::admission::MAX_NEWCOMERS;
 
     #[test]
     fn there_are_files_for_every_client_that_is_served_and_for_unauthenticated_ones() {
         /// More than the usual limit of 1,024 files allows.
         const WANTED: usize = 2000;
         const USUAL: usize = 1024 - OTHER_FILES;
+        let wanted = Room {
+            clients: WANTED,
+            newcomers: MAX_NEWCOMERS,
+        };
         for (files, asks_token, clients, newcomers) in [
             (usize::MAX, false, WANTED, MAX_NEWCOMERS),
             (WANTED + OTHER_FILES, false, WANTED, MAX_NEWCOMERS),
@@ -97,7 +99,7 @@ mod tests {
             (3, true, 1, 1),
         ] {
             let room = Room { clients, newcomers };
-            assert_eq!(room_with(files, WANTED, asks_token), room);
+            assert_eq!(room_with(files, wanted, asks_token), room);
         }
     }
 }
