@@ -13,6 +13,7 @@
 //! **Invariant:** dropping removes whole messages and never reorders. At most [`MAX_TOPIC_BYTES`] of topic messages
 //! wait, including those held back.
 
+pub mod flow;
 mod message;
 mod throttle;
 

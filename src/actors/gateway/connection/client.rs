@@ -18,7 +18,6 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::flow::{FRESH, FlowControl, UnreadSource};
 use super::session::HeldPlace;
 use super::transport::{ClientLost, ClientStream, Transport};
 use crate::actors::gateway::limits::{
@@ -32,7 +31,8 @@ use crate::actors::resources::turns::{Timer, end_turn};
 use crate::actors::resources::unread::Ends;
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, Level};
-use crate::protocol::outbox::{MAX_AGE, Outbox};
+use crate::protocol::outbox::Outbox;
+use crate::protocol::outbox::flow::{FlowControl, UnreadSource};
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -87,7 +87,7 @@ impl<S: ClientStream> Connection<S> {
             registry,
             gauges,
             outbox: Outbox::new(),
-            flow: FlowControl::new(unread, now),
+            flow: FlowControl::new(unread, now.into_std()),
             is_single: false,
             backlog: Arc::default(),
             gone: Arc::default(),
@@ -176,13 +176,12 @@ impl<S: ClientStream> Connection<S> {
         let room = if self.is_finishing {
             usize::MAX
         } else if has_topics || holds_back {
-            self.flow.room(now)
+            self.flow.room(now.into_std())
         } else {
             0
         };
         let most = if self.is_single { 1 } else { WRITE_FRAMES };
-        let is_far_behind = !self.is_finishing && self.flow.is_far_behind();
-        let fresh = if is_far_behind { FRESH } else { MAX_AGE };
+        let fresh = self.flow.max_age();
         self.counting_dropped(|outbox| {
             outbox.allow(room, fresh);
             outbox.take_frames(now.into_std(), most, WRITE_BYTES);
@@ -195,7 +194,7 @@ impl<S: ClientStream> Connection<S> {
     fn note_written(&mut self, bytes: usize) -> bool {
         let may_read = self.may_read();
         self.progress = Instant::now();
-        self.flow.note_written(bytes, self.progress);
+        self.flow.note_written(bytes, self.progress.into_std());
         let before = self.outbox.short_bytes();
         self.outbox.written(bytes);
         let written = before - self.outbox.short_bytes();
@@ -210,10 +209,11 @@ impl<S: ClientStream> Connection<S> {
     /// The earliest time of the next write, if nothing can be written now. Either a message is throttled, or the client
     /// must read first.
     fn next_release(&self) -> Option<Instant> {
-        let release = self.outbox.next_release().map(Instant::from_std);
+        let release = self.outbox.next_release();
         let waits = self.outbox.has_topics() && !self.outbox.has_responses();
         let query = self.flow.next_query().filter(|_| waits);
-        release.into_iter().chain(query).min()
+        let first = release.into_iter().chain(query).min();
+        first.map(Instant::from_std)
     }
 
     /// Whether the client has read nothing for too long while a long message waits.

@@ -10,7 +10,6 @@
 
 pub mod admission;
 mod client;
-mod flow;
 #[cfg(feature = "web")]
 mod http;
 mod reader;
@@ -31,7 +30,6 @@ use actix::prelude::*;
 use self::admission::Admission;
 use self::client::ClientWriter;
 pub use self::client::Connection;
-pub use self::flow::UnreadSource;
 use self::reader::{ClientReader, Discarder};
 use self::session::{ClientSession, Opened};
 pub use self::transport::ClientStream;
@@ -41,6 +39,7 @@ use crate::actors::panics::contained;
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::unread;
 pub use crate::actors::resources::unread::Ends;
+use crate::protocol::outbox::flow::UnreadSource;
 
 impl<S: ClientStream> Connection<S> {
     /// Starts the actor for `stream` in the current system. It requires no token.

@@ -1,4 +1,4 @@
-//! Flow control by the bytes that a client has read.
+//! Flow control by the bytes that a client has read. The caller passes the time, and a function for the unread bytes.
 //!
 //! Bytes in a client's socket get old, and cannot be dropped. The buffers of Linux hold 15 s of `/joint_states`. So a
 //! client slower than its topics is sent only as much as it reads in `AHEAD`. The rest is dropped before it is
@@ -8,9 +8,7 @@
 //! **Invariant:** nothing is held back from a client whose unread bytes are unknown.
 
 use std::collections::VecDeque;
-use std::time::Duration;
-
-use tokio::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::protocol::outbox::MAX_AGE;
 
@@ -23,7 +21,7 @@ const SLOW_AGE: Duration = Duration::from_millis(100);
 /// A slow client is sent as much as it reads in this time.
 const AHEAD: Duration = Duration::from_millis(200);
 /// Largest age of a topic message ahead of a response, for a client that is far behind.
-pub(super) const FRESH: Duration = Duration::from_millis(200);
+const FRESH: Duration = Duration::from_millis(200);
 /// Time between two queries of the client's unread bytes: after a query that found none, after one that found some, and
 /// while the client is slow. A query takes two system calls.
 const QUERY_INTERVAL_IDLE: Duration = Duration::from_millis(300);
@@ -39,7 +37,7 @@ const HISTORY_STEP: Duration = Duration::from_millis(20);
 const MAX_HISTORY: usize = 256;
 
 /// Counts bytes that were written to a client, and the bytes that it has read.
-pub(super) struct FlowControl {
+pub struct FlowControl {
     source: UnreadSource,
     /// Bytes written so far.
     written: u64,
@@ -60,7 +58,9 @@ pub(super) struct FlowControl {
 }
 
 impl FlowControl {
-    pub(super) fn new(source: UnreadSource, now: Instant) -> Self {
+    /// The state of a client to which nothing was written.
+    #[must_use]
+    pub fn new(source: UnreadSource, now: Instant) -> Self {
         Self {
             source,
             written: 0,
@@ -75,7 +75,7 @@ impl FlowControl {
     }
 
     /// Notes that `bytes` have been written.
-    pub(super) fn note_written(&mut self, bytes: usize, now: Instant) {
+    pub fn note_written(&mut self, bytes: usize, now: Instant) {
         let bytes = bytes as u64;
         self.written += bytes;
         self.room = self.room.saturating_sub(bytes);
@@ -87,25 +87,29 @@ impl FlowControl {
     }
 
     /// Bytes of topic messages that may be written now. A limit is updated at [`next_query`](Self::next_query).
-    pub(super) fn room(&mut self, now: Instant) -> usize {
+    pub fn room(&mut self, now: Instant) -> usize {
         if now >= self.next {
             self.query(now);
         }
         usize::try_from(self.room).unwrap_or(usize::MAX)
     }
 
-    /// Whether the client still reads bytes that were written more than a second ago.
-    pub(super) fn is_far_behind(&self) -> bool {
-        self.age > MAX_AGE
+    /// Largest age of a topic message ahead of a response. It is smaller while the client still reads bytes that were
+    /// written more than a second ago.
+    #[must_use]
+    pub fn max_age(&self) -> Duration {
+        if self.age > MAX_AGE { FRESH } else { MAX_AGE }
     }
 
     /// Age of the oldest unread byte at the last query.
-    pub(super) const fn age(&self) -> Duration {
+    #[must_use]
+    pub const fn age(&self) -> Duration {
         self.age
     }
 
     /// The time of the next query, if nothing may be written before it.
-    pub(super) fn next_query(&self) -> Option<Instant> {
+    #[must_use]
+    pub fn next_query(&self) -> Option<Instant> {
         (self.room == 0).then_some(self.next)
     }
 
