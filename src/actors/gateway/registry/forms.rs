@@ -10,10 +10,10 @@ use bytes::Bytes;
 use serde_json::value::RawValue;
 
 use super::Subscriber;
-use super::forwarded::own_id;
 use crate::actors::resources::long_work::SHORT_WORK;
 use crate::actors::resources::memory::{Permit, cover_message};
 use crate::protocol::messages;
+use crate::protocol::names::own_id;
 use crate::protocol::op::{Compression, Encoding};
 use crate::protocol::outbox::MAX_MESSAGE;
 use crate::protocol::ros::{cbor, stamps};

@@ -10,12 +10,9 @@ use tokio::time::Instant;
 use super::kept::KeptEntry;
 use crate::actors::ConnectionId;
 use crate::actors::node::Done;
-use crate::protocol::names::{self, OWN_ID_PREFIX};
+use crate::protocol::names::{self, own_id, own_id_number};
 use crate::protocol::op::Served;
 use crate::protocol::wire::json::Payload;
-
-/// Longest spelling of a request's id in JSON: prefix, twenty digits, quotes, each character escaped as `\u0070`.
-const LONGEST_ID: usize = 6 * (OWN_ID_PREFIX.len() + 20) + 2;
 
 /// A call or a goal.
 pub(super) struct Forwarded {
@@ -68,20 +65,6 @@ pub(super) struct Requests {
     made: u64,
 }
 
-/// The id of request `number` at its provider, or of the pieces of a message.
-pub(super) fn own_id(number: u64) -> String {
-    format!("{OWN_ID_PREFIX}{number}")
-}
-
-/// The number of the request that has this id.
-fn number_of(id: &Payload) -> Option<u64> {
-    let id = Some(id).filter(|id| id.get().len() <= LONGEST_ID)?;
-    let id: String = serde_json::from_str(id.get()).ok()?;
-    let number: u64 = id.strip_prefix(OWN_ID_PREFIX)?.parse().ok()?;
-    // Each request has one id, though `+1` and `01` are numbers too.
-    (id == own_id(number)).then_some(number)
-}
-
 impl Requests {
     /// Adds a request. Returns its id at its provider.
     pub(super) fn add(&mut self, request: Forwarded) -> String {
@@ -117,7 +100,7 @@ impl Requests {
         provider: ConnectionId,
     ) -> Option<u64> {
         let number = match id {
-            Some(id) => number_of(id)?,
+            Some(id) => own_id_number(id.get())?,
             None => {
                 let mut numbers = self.numbers(RequestKey::Provider(provider, kind));
                 numbers.next().filter(|_| numbers.next().is_none())?
@@ -218,24 +201,5 @@ impl Requests {
         for number in made.collect::<Vec<u64>>() {
             self.take(number);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use serde_json::value::RawValue;
-
-    use super::*;
-
-    #[test]
-    fn a_calls_id_is_known_however_its_provider_spells_it() {
-        let payload = |json: String| Payload::from(RawValue::from_string(json).unwrap());
-        let id = own_id(u64::MAX);
-        let escaped: String = id.bytes().map(|byte| format!("\\u{byte:04x}")).collect();
-        for spelling in [format!("\"{id}\""), format!("\"{escaped}\"")] {
-            assert_eq!(number_of(&payload(spelling)), Some(u64::MAX));
-        }
-        let another = format!("\"{OWN_ID_PREFIX}01\"");
-        assert_eq!(number_of(&payload(another)), None);
     }
 }

@@ -12,7 +12,7 @@ use bytes::Bytes;
 use serde_json::json;
 use tokio::time::Instant;
 
-use super::forwarded::{Forwarded, own_id};
+use super::forwarded::Forwarded;
 use super::refusal::Refusal;
 use super::{Client, FrameOrigin, Handled, RefuseCalls, Registry, Tapped};
 use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
@@ -402,7 +402,7 @@ impl Registry {
             return Err(Refusal::NoAction(action.to_owned()));
         };
         let spelling = &*provider.spelling;
-        let length = messages::cancellation(spelling, &own_id(u64::MAX)).len();
+        let length = messages::cancellation(spelling, &names::own_id(u64::MAX)).len();
         let room = MAX_BACKLOG.saturating_sub(server.backlog()) / length;
         let (ids, is_rest) = self.requests.cancel_all(action, provider.connection, room);
         for id in &ids {
