@@ -24,7 +24,7 @@ pub const CLIENT_BYTES: usize = 2 * MEDIUM
     + MAX_BACKLOG
     + SHORT
     + 2 * SHORT
-    + MAX_KEPT
+    + MAX_REGISTERED
     + 96 * KIB;
 /// Most forms of a published message that is longer than [`MEDIUM`]: plain, or as subscribers have requested it.
 /// Subscribers who requested a further form do not get it.
@@ -53,7 +53,7 @@ pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
 pub const MAX_BACKLOG: usize = 2 * MAX_RESPONSES_WAITING;
 /// Bytes that the registry keeps of one connection: subscriptions, advertisements, services, and calls and goals that
 /// wait for other clients.
-pub const MAX_KEPT: usize = 128 * 1024;
+pub const MAX_REGISTERED: usize = 128 * 1024;
 /// Bytes of each entry in the tables, without three times its names.
 pub const ENTRY_BYTES: usize = 640;
 /// Timeout of a request's head from its first bytes, and of a client's token from the connection. It is enough for a

@@ -8,7 +8,7 @@ use pendularm::actors::gateway::connection::admission::{
 };
 use pendularm::actors::gateway::limits::{
     DEFAULT_TIMEOUT, ENTRY_BYTES, FRAME_TIME, HEAD_TIME, KEPT_PLACES, LINGER, MAX_BACKLOG,
-    MAX_COMPUTATIONS_WAITING, MAX_KEPT, MAX_RESPONSES_WAITING, OPENING_TIME, RESPONSES_TIME,
+    MAX_COMPUTATIONS_WAITING, MAX_REGISTERED, MAX_RESPONSES_WAITING, OPENING_TIME, RESPONSES_TIME,
     STALL_LIMIT,
 };
 use pendularm::actors::ros::tf_web::{MAX_FRAME_SUBSCRIPTIONS, MAX_FRAMES};
@@ -20,16 +20,19 @@ use pendularm::services::trajectory::MAX_POINTS;
 use pendularm::web::head::{MAX_HEAD, MAX_HEADERS};
 use serde_json::Value;
 
-/// Limits in place of numbers. Times are in ms. `KEPT_OF_5` entries with 5 bytes of names are the most that a client
+/// Limits in place of numbers. Times are in ms. `REGISTERED_OF_5` entries with 5 bytes of names are the most that a client
 /// may register.
 const LIMITS: &[(&str, usize)] = &[
     ("DEFAULT_CLIENTS", DEFAULT_CLIENTS),
     ("DEFAULT_TIMEOUT", ms(DEFAULT_TIMEOUT)),
     ("FRAME_TIME", ms(FRAME_TIME)),
     ("HEAD_TIME", ms(HEAD_TIME)),
-    ("KEPT_OF_5", MAX_KEPT / (ENTRY_BYTES + 3 * 5)),
-    ("KEPT_OF_12", MAX_KEPT / (ENTRY_BYTES + 3 * 12)),
-    ("KEPT_OF_1000", MAX_KEPT / (ENTRY_BYTES + 3 * 1000)),
+    ("REGISTERED_OF_5", MAX_REGISTERED / (ENTRY_BYTES + 3 * 5)),
+    ("REGISTERED_OF_12", MAX_REGISTERED / (ENTRY_BYTES + 3 * 12)),
+    (
+        "REGISTERED_OF_1000",
+        MAX_REGISTERED / (ENTRY_BYTES + 3 * 1000),
+    ),
     ("KEPT_PLACES", KEPT_PLACES),
     ("LINGER", ms(LINGER)),
     ("MAX_COMPUTATIONS_WAITING", MAX_COMPUTATIONS_WAITING),

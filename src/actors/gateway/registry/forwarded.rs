@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tokio::time::Instant;
 
-use super::kept::KeptEntry;
+use super::registrations::Entry;
 use crate::actors::ConnectionId;
 use crate::actors::node::Done;
 use crate::protocol::names::{self, own_id, own_id_number};
@@ -33,8 +33,8 @@ pub(super) struct Forwarded {
     pub(super) is_cancelled: bool,
     /// A caller that has stopped sending is removed when its last call has ended.
     pub(super) _done: Option<Done>,
-    /// Its part of the caller's limit [`MAX_KEPT`](crate::actors::gateway::limits::MAX_KEPT).
-    pub(super) _entry: KeptEntry,
+    /// Its part of the caller's limit [`MAX_REGISTERED`](crate::actors::gateway::limits::MAX_REGISTERED).
+    pub(super) _entry: Entry,
 }
 
 /// A key of the index. Deadlines sort first, so the first entry is the next deadline.

@@ -10,9 +10,9 @@
 mod directory;
 mod forms;
 mod forwarded;
-mod kept;
 mod places;
 mod refusal;
+mod registrations;
 mod requests;
 mod topics;
 
@@ -30,8 +30,8 @@ use tokio::time::Instant;
 
 use self::directory::Directory;
 use self::forwarded::Requests;
-use self::kept::{Kept, KeptEntry, Registrations};
 use self::places::Places;
+use self::registrations::{Entry, EntrySum, Registrations};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::MAX_BACKLOG;
 pub use crate::actors::node::Nodes;
@@ -82,7 +82,7 @@ struct Client {
     /// Its address.
     from: IpAddr,
     /// The sum of its registrations, and of its calls and goals that wait for other clients.
-    kept: Kept,
+    entries: EntrySum,
     registered: Registrations,
     /// Topics of the runtime's subscriptions that this client has explicitly unadvertised. Its messages there are
     /// dropped until it advertises again.
@@ -128,7 +128,7 @@ impl Client {
             outlets,
             link,
             from,
-            kept: Kept::default(),
+            entries: EntrySum::default(),
             registered: Registrations::default(),
             withdrawn: HashSet::new(),
             verbosity: Verbosity::ALL,
@@ -409,8 +409,8 @@ struct Subscription {
     throttle: Duration,
     queue_length: usize,
     encoding: Encoding,
-    /// Its part of the client's limit [`MAX_KEPT`](crate::actors::gateway::limits::MAX_KEPT).
-    entry: KeptEntry,
+    /// Its part of the client's limit [`MAX_REGISTERED`](crate::actors::gateway::limits::MAX_REGISTERED).
+    entry: Entry,
 }
 
 /// The topics, by their absolute names.

@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** every sentence begins with its field, or names the service.
 
-use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_BACKLOG, MAX_KEPT};
+use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_BACKLOG, MAX_REGISTERED};
 use crate::protocol::op::{Problem, Served};
 use crate::services::NoService;
 
@@ -13,9 +13,9 @@ pub(super) enum Refusal {
     RuntimeTopic(String),
     #[error(
         "this connection keeps too much: its subscriptions, advertisements, services, and waiting calls and goals may \
-         take {MAX_KEPT} bytes. Each takes {ENTRY_BYTES} bytes and three times its names and ids"
+         take {MAX_REGISTERED} bytes. Each takes {ENTRY_BYTES} bytes and three times its names and ids"
     )]
-    TooMuchKept,
+    TooMuchRegistered,
     #[error(
         "compression: cbor-raw needs a message type that this runtime knows; give it as type, or subscribe with cbor"
     )]

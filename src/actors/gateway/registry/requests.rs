@@ -284,7 +284,7 @@ impl Registry {
         };
         let bytes = spelling.len() + type_name.map_or(0, str::len);
         let (key, served) = ((kind, name.into()), &mut client.registered.served);
-        let entry = client.kept.enter(bytes, served.get(&key))?;
+        let entry = client.entries.enter(bytes, served.get(&key))?;
         served.insert(key, entry);
         let provider = (origin.from, spelling);
         let before = self.directory.provide(kind, name, provider, type_name);
@@ -363,7 +363,7 @@ impl Registry {
             wants_feedback,
             is_cancelled: false,
             _done: done,
-            _entry: caller.kept.enter(bytes, None)?,
+            _entry: caller.entries.enter(bytes, None)?,
         });
         if let Some(server) = server {
             server.send(self.covered(encode(&provider.spelling, &known_as)));

@@ -44,7 +44,7 @@ impl Registry {
         };
         let before = client.registered.advertised.get(topic);
         let bytes = topic.len() + type_name.map_or(0, str::len);
-        let entry = client.kept.enter(bytes, before)?;
+        let entry = client.entries.enter(bytes, before)?;
         if before.is_none() {
             self.topics.add_publisher(topic);
         }
@@ -122,7 +122,7 @@ impl Registry {
             .and_then(|one| one.subscription(id.as_deref()));
         let is_new = before.is_none();
         let instead = before.map(|one| &one.entry);
-        let entry = client.kept.enter(topic.len() + bytes, instead)?;
+        let entry = client.entries.enter(topic.len() + bytes, instead)?;
         let subscription = Subscription {
             id: id.clone(),
             throttle: subscribe.throttle,
