@@ -20,19 +20,16 @@ use pendularm::services::trajectory::MAX_POINTS;
 use pendularm::web::head::{MAX_HEAD, MAX_HEADERS};
 use serde_json::Value;
 
-/// Limits in place of numbers. Times are in ms. `REGISTERED_OF_5` entries with 5 bytes of names are the most that a client
+/// Limits in place of numbers. Times are in ms. `ENTRIES_OF_5` entries with 5 bytes of names are the most that a client
 /// may register.
 const LIMITS: &[(&str, usize)] = &[
     ("DEFAULT_CLIENTS", DEFAULT_CLIENTS),
     ("DEFAULT_TIMEOUT", ms(DEFAULT_TIMEOUT)),
     ("FRAME_TIME", ms(FRAME_TIME)),
     ("HEAD_TIME", ms(HEAD_TIME)),
-    ("REGISTERED_OF_5", MAX_REGISTERED / (ENTRY_BYTES + 3 * 5)),
-    ("REGISTERED_OF_12", MAX_REGISTERED / (ENTRY_BYTES + 3 * 12)),
-    (
-        "REGISTERED_OF_1000",
-        MAX_REGISTERED / (ENTRY_BYTES + 3 * 1000),
-    ),
+    ("ENTRIES_OF_5", MAX_REGISTERED / (ENTRY_BYTES + 3 * 5)),
+    ("ENTRIES_OF_12", MAX_REGISTERED / (ENTRY_BYTES + 3 * 12)),
+    ("ENTRIES_OF_1000", MAX_REGISTERED / (ENTRY_BYTES + 3 * 1000)),
     ("KEPT_PLACES", KEPT_PLACES),
     ("LINGER", ms(LINGER)),
     ("MAX_COMPUTATIONS_WAITING", MAX_COMPUTATIONS_WAITING),
