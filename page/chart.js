@@ -221,8 +221,9 @@ export function drawMap(chart, rows, at, factor) {
     context.strokeStyle = colors.muted;
     context.lineWidth = 1;
     context.strokeRect(left, top, right - left, bottom - top);
-    chart.words("stable", left + 10, chart.y(1) - 14, "left"); // the very low gains at the lower edge cannot hold the arm
-    chart.words("shakes", right - 10, top + 16, "right");
+    const held = rows.filter((row) => row.limit > across.low);
+    if (held.length > 0) chart.words("stable", left + 10, chart.y(held[held.length >> 1].factor) - 14, "left");
+    if (rows.some((row) => row.limit < across.high)) chart.words("shakes", right - 10, top + 16, "right");
   }
   circle(context, chart.x(across.within(at)), chart.y(up.within(factor)), 7, colors.accent, colors.panel, 2);
 }
