@@ -191,7 +191,8 @@ export function verdict(/** @type {any} */ state) {
     const sentence = `${at} is stable ${where}, but ${others}.`;
     return { kind: "here", pill: "stable here only", sentence, ...known };
   }
-  return { kind: "stable", pill: "stable", sentence: `${at} is within the limit ${limitText(limit)}, ${where}.`, ...known };
+  const sentence = limit === Infinity ? `No limit was found, ${where}.` : `${at} is within the limit ${duration(limit)}, ${where}.`;
+  return { kind: "stable", pill: "stable", sentence, ...known };
 }
 
 /** Why a time is too long; empty if it is not. @param {string} at the text of the time @param {number} time @param {string} named the limit in words @param {number} limit @param {string} where */
@@ -279,7 +280,7 @@ export function others(limits) {
   const [least, most] = [Math.min(...finite), Math.max(...finite)];
   if (most <= ALIKE * least) return "A better method hardly helps here, because the controller acts only once a step. It makes the simulated motion more exact.";
   const best = METHODS.filter(([method]) => limits[method] > most / ALIKE).map(([, name]) => name);
-  return `${best.join(", ")}: stable up to ${limitText(most)}.`;
+  return `${best.join(", ")}: ${most === Infinity ? "no limit was found" : `stable up to ${limitText(most)}`}.`;
 }
 
 /** @typedef {{gravity: number, masses: number[], lengths: number[]}} Arm */

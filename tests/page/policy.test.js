@@ -46,7 +46,7 @@ const VERDICTS = [
   ["a motion with a smaller limit than the pose", at(0.006, served({ timestep_limit_motion: 0.004, motion_speed: 12.5, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" })), { kind: "beyond", pill: "beyond the estimated limit", where: /^moving at up to 12\.5 rad\/s$/ }],
   ["a pose that the arm sags to", served({ equilibrium: [0.5, -1.4], equilibrium_kind: "sagging" }), { where: /^at the pose to which it sags, \(0\.50, −1\.40\) rad$/ }],
   ["Euler's free swing", { enabled: false, ...served({ timestep_limit_held: 0, advised_timestep: 0, minimum_over_poses_held: 0 }) }, { kind: "never", advised: NaN }],
-  ["nothing that limits", { enabled: false, stability: Object.fromEntries(Object.keys(VALUES).map((key) => [key, null])) }, { kind: "stable", limit: Infinity }],
+  ["nothing that limits", { enabled: false, stability: Object.fromEntries(Object.keys(VALUES).map((key) => [key, null])) }, { kind: "stable", limit: Infinity, sentence: /^No limit was found, / }],
   ["numbers that overflow without a controller", { enabled: false, ...served({ timestep_limit_held: 0, equilibrium: [-1.57, 0], equilibrium_kind: "unstable" }) }, { sentence: "No stable timestep is known, at (−1.57, 0.00) rad." }],
   ["an arm that has diverged", { diagnostics: { state: "diverged" } }, { kind: "diverged" }],
 ];
