@@ -23,7 +23,7 @@ use super::transport::{ClientLost, ClientStream, Transport};
 use crate::actors::gateway::limits::{
     LINGER, MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES,
 };
-use crate::actors::gateway::registry::{Registry, Request, Retire, ToClient};
+use crate::actors::gateway::registry::{Registry, Request, ToClient};
 use crate::actors::panics::{Contained, contain};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::SHORT;
@@ -198,7 +198,9 @@ impl<S: ClientStream> Connection<S> {
         let before = self.outbox.short_bytes();
         self.outbox.written(bytes);
         let written = before - self.outbox.short_bytes();
-        self.backlog.fetch_sub(written, Ordering::Relaxed);
+        if written > 0 {
+            self.backlog.fetch_sub(written, Ordering::Relaxed);
+        }
         if self.outbox.response_bytes() == 0 {
             self.responses_since = None;
         }
@@ -273,9 +275,6 @@ impl<S: ClientStream> Connection<S> {
         self.computations.clear();
         self.is_running = false;
         self.gone.store(true, Ordering::Relaxed);
-        if let Some(place) = &self.place {
-            self.registry.do_send(Retire(place.id));
-        }
         self.is_finishing = true;
     }
 }

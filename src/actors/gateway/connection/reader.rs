@@ -142,6 +142,7 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
                 Ok(step) => reader.step = step,
                 Err(lost) => {
                     client.is_refused |= lost == ClientLost::Refused;
+                    client.registry.do_send(Retire(reader.id));
                     client.leave();
                     return Poll::Ready(());
                 }
