@@ -154,6 +154,12 @@ impl Topic {
         self.entry().direction
     }
 
+    /// Whether the runtime subscribes to these messages.
+    #[must_use]
+    pub const fn is_subscribed(self) -> bool {
+        matches!(self.direction(), Direction::Subscribed)
+    }
+
     /// Whether a new subscriber gets the last message.
     #[must_use]
     pub const fn is_latched(self) -> bool {

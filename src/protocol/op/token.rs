@@ -4,8 +4,11 @@
 //! the secret.
 
 use std::fmt;
+use std::time::Duration;
 
 use subtle::ConstantTimeEq;
+
+use super::{Incoming, Op};
 
 /// Shortest token in characters: 16 random letters and digits cannot be guessed.
 pub const MIN_TOKEN: usize = 16;
@@ -49,6 +52,37 @@ impl Token {
 impl fmt::Debug for Token {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Token(…)")
+    }
+}
+
+/// Why a client that must send a token is not admitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum AuthError {
+    /// The first frame has no token, or there is none.
+    #[error("this runtime requires its token first: {{\"op\":\"auth\",\"token\":...}}")]
+    NotShown,
+    /// Another token.
+    #[error("token: not this runtime's")]
+    Wrong,
+    /// No whole frame came in time; holds the limit.
+    #[error("this runtime requires its token first, and waited for {} s", .0.as_secs())]
+    TooLate(Duration),
+    /// The first frame is too long; holds the limit in bytes.
+    #[error("this runtime requires its token first, in at most {0} bytes")]
+    TooMuch(usize),
+}
+
+/// Checks whether a client's first frame has the token.
+///
+/// # Errors
+/// If it has none or another one.
+pub fn authenticate(token: &Token, frame: &Incoming) -> Result<(), AuthError> {
+    match &frame.op {
+        Ok(Op::Auth {
+            token: Some(shown), ..
+        }) if token.matches(shown) => Ok(()),
+        Ok(Op::Auth { token: Some(_), .. }) => Err(AuthError::Wrong),
+        _ => Err(AuthError::NotShown),
     }
 }
 

@@ -42,3 +42,22 @@ impl QueuedMessage {
 pub(super) fn counted(frame: &Bytes) -> usize {
     frame.len().min(MEDIUM)
 }
+
+/// The topic messages that wait, queued or held back: their number, and the bytes of them that count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Waiting {
+    pub(super) count: usize,
+    pub(super) bytes: usize,
+}
+
+impl Waiting {
+    pub(super) fn add(&mut self, message: &QueuedMessage) {
+        self.count += 1;
+        self.bytes += counted(&message.frame);
+    }
+
+    pub(super) fn forget(&mut self, message: &QueuedMessage) {
+        self.count -= 1;
+        self.bytes -= counted(&message.frame);
+    }
+}

@@ -13,7 +13,9 @@
 //! **Invariant:** dropping removes whole messages and never reorders. At most [`MAX_TOPIC_BYTES`] of topic messages
 //! wait, including those held back.
 
+mod dropping;
 pub mod flow;
+mod held;
 mod message;
 mod throttle;
 
@@ -24,27 +26,12 @@ use std::time::{Duration, Instant};
 
 use bytes::{Buf, Bytes};
 
-use self::message::{QueuedMessage, counted};
+pub use self::dropping::{MAX_AGE, MAX_MESSAGE, MAX_TOPIC_BYTES, MESSAGE_BYTES};
+use self::message::{QueuedMessage, Waiting, counted};
 pub use self::throttle::Throttle;
-use self::throttle::{HeldBack, TopicLimits};
-use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
-use crate::protocol::wire::series::{
-    by_itself, first_message, first_messages, last_messages, messages,
-};
-
-/// Most bytes of topic messages that wait for one connection, each with [`MESSAGE_BYTES`]: ten seconds of the arm's
-/// own. A message longer than [`MEDIUM`] uses the shared pool and counts as [`MEDIUM`] here, so at most one of them
-/// waits.
-pub const MAX_TOPIC_BYTES: usize = 304 * 1024;
-/// The longest topic message: the longest frame of a client, and the newline after it.
-pub const MAX_MESSAGE: usize = MAX_FRAME + 1;
-/// Largest age of a waiting topic message. Older ones are dropped, except the newest of its topic.
-pub const MAX_AGE: Duration = Duration::from_secs(1);
-/// The same after a message has been too old, until the queue is empty. The client is then slower than its topics.
-/// Its messages are late by this time and by its unread bytes.
-const MAX_AGE_BEHIND: Duration = Duration::from_millis(500);
-/// Bytes counted for a waiting message besides its own: reference count, queue entry, and the allocator's overhead.
-pub const MESSAGE_BYTES: usize = 160;
+use self::throttle::TopicLimits;
+use crate::protocol::limits::{MEDIUM, SHORT};
+use crate::protocol::wire::series::first_message;
 
 /// The outgoing queue of one connection.
 #[derive(Debug, Default)]
@@ -63,11 +50,9 @@ pub struct Outbox {
     responses: VecDeque<(u64, Bytes)>,
     /// The client's limits, by topic.
     limits: HashMap<Arc<str>, TopicLimits>,
-    held: HeldBack,
-    /// The next number. A lower number leaves first, and is dropped first.
+    /// The last number. A lower number leaves first, and is dropped first.
     produced: u64,
-    /// Counted bytes of queued topic messages, without held ones.
-    topic_bytes: usize,
+    waiting: Waiting,
     /// Bytes of responses that are queued or being written, and the bytes of the short ones.
     response_bytes: usize,
     short_bytes: usize,
@@ -100,17 +85,12 @@ impl Outbox {
         if !self.may_fit(&frame) {
             return;
         }
-        match self.limits.get(topic) {
-            Some(limits) if limits.holds_back() => self.offer(topic, frame, now),
-            Some(_) => {
-                let is_series = first_message(&frame) < frame.len();
-                for frame in messages(frame) {
-                    self.enqueue(Some(topic), now, by_itself(frame, is_series));
-                }
-            }
-            None => self.enqueue(Some(topic), now, frame),
+        if self.limits.contains_key(topic) {
+            self.offer(topic, frame, now);
+            self.keep_to_queue_length(topic);
+        } else {
+            self.enqueue(Some(topic), now, frame);
         }
-        self.keep_to_queue_length(topic);
         self.drop_old(now);
         self.keep_bounded();
         self.check_sums();
@@ -125,12 +105,6 @@ impl Outbox {
         }
     }
 
-    /// Whether any message is held back.
-    #[must_use]
-    pub const fn holds_back(&self) -> bool {
-        self.held.count > 0
-    }
-
     /// Adds a response or a status. Held messages of the topics in `supersedes` are outdated by it, and are discarded.
     pub fn push_response(&mut self, frame: Bytes, supersedes: &[&str]) {
         self.discard_held(supersedes);
@@ -138,8 +112,8 @@ impl Outbox {
         if frame.len() <= SHORT {
             self.short_bytes += frame.len();
         }
-        let number = next_number(&mut self.produced);
-        self.responses.push_back((number, frame));
+        self.produced += 1;
+        self.responses.push_back((self.produced, frame));
     }
 
     /// Sets how many bytes of topic messages may be taken from now on. Messages before a response are taken in
@@ -154,8 +128,7 @@ impl Outbox {
     pub fn take_frames(&mut self, now: Instant, max_frames: usize, max_bytes: usize) {
         self.release(now);
         self.drop_old(now);
-        let mut bytes = 0;
-        let mut taken = 0;
+        let (mut bytes, mut taken) = (0, 0);
         while taken < max_frames.max(1) {
             let topic = self.topics.front().map_or(u64::MAX, |topic| topic.number);
             let response = self.responses.front();
@@ -175,32 +148,23 @@ impl Outbox {
                 }
             }
             let next = if is_response {
-                self.responses.front_mut().map(|(_, frame)| frame)
+                self.responses.front().map(|(_, frame)| frame)
             } else {
-                self.topics.front_mut().map(|message| &mut message.frame)
+                self.topics.front().map(|message| &message.frame)
             };
-            let Some(next) = next else {
-                break;
-            };
-            let length = if max_frames <= 1 && !is_response {
-                first_message(next)
-            } else {
-                next.len()
-            };
+            let length = next.map_or(0, |next| match max_frames {
+                0 | 1 if !is_response => first_message(next),
+                _ => next.len(),
+            });
             bytes += length;
             if taken > 0 && bytes > max_bytes {
                 break;
             }
             taken += 1;
-            let frame = if length < next.len() {
-                self.topic_bytes -= counted(next);
-                let first = next.split_to(length);
-                self.topic_bytes += counted(next);
-                Some(first)
-            } else if is_response {
+            let frame = if is_response {
                 self.responses.pop_front().map(|(_, frame)| frame)
             } else {
-                self.take_out(0).map(|message| message.frame)
+                self.take_first(length)
             };
             if let Some(room) = self.room.as_mut().filter(|_| !is_response) {
                 *room = room.saturating_sub(length);
@@ -211,7 +175,7 @@ impl Outbox {
                 length,
             }));
         }
-        self.is_behind &= !self.topics.is_empty();
+        self.is_behind &= self.has_topics();
         self.check_sums();
     }
 
@@ -281,14 +245,14 @@ impl Outbox {
 
     /// The number of waiting topic messages or series, including held ones.
     #[must_use]
-    pub fn topic_count(&self) -> usize {
-        self.topics.len() + self.held.count
+    pub const fn topic_count(&self) -> usize {
+        self.waiting.count
     }
 
     /// Counted bytes of waiting topic messages, including held ones.
     #[must_use]
     pub const fn topic_bytes(&self) -> usize {
-        self.topic_bytes + self.held.bytes
+        self.waiting.bytes
     }
 
     /// Topic messages dropped so far because of the limits. A message that throttling replaces by a newer one
@@ -304,248 +268,36 @@ impl Outbox {
         !self.topics.is_empty()
     }
 
+    /// Queues a message or a series. An old message of its topic is dropped.
     fn enqueue(&mut self, topic: Option<&Arc<str>>, since: Instant, frame: Bytes) {
-        self.topic_bytes += counted(&frame);
-        let number = next_number(&mut self.produced);
+        self.produced += 1;
         let replaced = topic.and_then(|topic| {
             let mut old = self.topics.range(..self.kept_old);
             old.position(|message| message.is_on(topic))
         });
-        self.topics.push_back(QueuedMessage {
-            number,
+        let message = QueuedMessage {
+            number: self.produced,
             since,
             topic: topic.cloned(),
             frame,
-        });
+        };
+        self.waiting.add(&message);
+        self.topics.push_back(message);
         if let Some(replaced) = replaced {
             self.drop_message(replaced);
         }
     }
 
-    /// Compares the sums with the messages that they are of. Builds without debug assertions omit it.
-    fn check_sums(&self) {
-        if !cfg!(debug_assertions) {
-            return;
+    /// Takes the first `length` bytes of the queue, which are whole messages of its first entry.
+    fn take_first(&mut self, length: usize) -> Option<Bytes> {
+        let first = &mut self.topics.front_mut()?.frame;
+        if length >= first.len() {
+            return self.take_out(0).map(|message| message.frame);
         }
-        let queued = || self.topics.iter();
-        let held = || self.limits.values().flat_map(|limits| &limits.held);
-        let bytes = |message: &QueuedMessage| counted(&message.frame);
-        debug_assert_eq!(self.topic_bytes, queued().map(bytes).sum::<usize>());
-        debug_assert_eq!(self.held.bytes, held().map(bytes).sum::<usize>());
-        debug_assert_eq!(self.held.count, held().count());
-        debug_assert!(self.kept_old <= self.topics.len());
-        let waiting = self.responses.iter();
-        let waiting = waiting.map(|(_, frame)| (frame.len(), frame.len()));
-        let writing = self.writing.iter().filter(|frame| frame.is_response);
-        let writing = writing.map(|frame| (frame.rest.len(), frame.length));
-        let responses = || waiting.clone().chain(writing.clone());
-        let short = responses().filter(|(_, length)| *length <= SHORT);
-        debug_assert_eq!(self.short_bytes, short.map(|(rest, _)| rest).sum::<usize>());
-        debug_assert_eq!(
-            self.response_bytes,
-            responses().map(|(rest, _)| rest).sum::<usize>()
-        );
-    }
-}
-
-/// The number of the next message or response in the order of production.
-const fn next_number(produced: &mut u64) -> u64 {
-    *produced += 1;
-    *produced
-}
-
-// ---- throttles ------------------------------------------------------------------------------------------------------
-
-impl Outbox {
-    /// Sets the limits of a topic, or removes them after an unsubscription. Queued messages are still sent. If the
-    /// throttle ends, held messages count as produced now.
-    pub fn configure(&mut self, topic: &Arc<str>, throttle: Option<Throttle>) {
-        let Some(throttle) = throttle else {
-            self.take_held(topic);
-            self.limits.remove(topic);
-            return;
-        };
-        let limits = self.limits.entry(Arc::clone(topic)).or_default();
-        limits.throttle = throttle;
-        if limits.holds_back() {
-            return limits.trim(&mut self.held);
-        }
-        limits.last = None;
-        for held in self.take_held(topic) {
-            self.enqueue(Some(topic), held.since, held.frame);
-        }
-        self.keep_to_queue_length(topic);
-        if throttle.queue_length.is_none() {
-            self.limits.remove(topic);
-        }
-    }
-
-    /// Passes each message to the throttle separately. Once one is held back, the following ones are too, and only the
-    /// newest of these remain.
-    fn offer(&mut self, topic: &Arc<str>, mut frames: Bytes, now: Instant) {
-        let is_series = first_message(&frames) < frames.len();
-        while !frames.is_empty() {
-            let Some(limits) = self.limits.get_mut(topic) else {
-                return;
-            };
-            if limits.held.is_empty() && limits.is_due(now) {
-                limits.last = Some(now);
-                let frame = frames.split_to(first_message(&frames));
-                self.enqueue(Some(topic), now, by_itself(frame, is_series));
-                continue;
-            }
-            if is_series {
-                frames = last_messages(frames, limits.throttle.held_back);
-            }
-            for frame in messages(std::mem::take(&mut frames)) {
-                if frame.len() > MEDIUM && !limits.may_hold_long(now) {
-                    self.dropped += 1;
-                    continue;
-                }
-                let message = QueuedMessage {
-                    number: next_number(&mut self.produced),
-                    since: now,
-                    topic: Some(Arc::clone(topic)),
-                    frame: by_itself(frame, is_series),
-                };
-                self.held.add(&message);
-                limits.held.push_back(message);
-            }
-            limits.trim(&mut self.held);
-        }
-    }
-
-    /// Discards all that is held back of these topics.
-    pub fn discard_held(&mut self, topics: &[&str]) {
-        for topic in topics {
-            self.take_held(topic);
-        }
-    }
-
-    /// Takes all that is held back of a topic, oldest first; its throttle stays.
-    fn take_held(&mut self, topic: &str) -> VecDeque<QueuedMessage> {
-        let limits = self.limits.get_mut(topic);
-        let held = limits.map_or_else(VecDeque::new, |limits| std::mem::take(&mut limits.held));
-        held.iter().for_each(|message| self.held.forget(message));
-        held
-    }
-
-    /// When the next held message is due, if any is held: the time to take frames again.
-    #[must_use]
-    pub fn next_release(&self) -> Option<Instant> {
-        self.next_due().map(|(due, _)| due)
-    }
-
-    /// The topic with the earliest due message, and its time. A client has at most about 200 topics.
-    fn next_due(&self) -> Option<(Instant, &Arc<str>)> {
-        let limits = self.limits.iter();
-        let due = limits.filter_map(|(topic, limits)| Some((limits.due()?, topic)));
-        due.min()
-    }
-
-    /// Queues the held messages that are due. The client requested this delay, so their age counts from now.
-    fn release(&mut self, now: Instant) {
-        if !self.holds_back() {
-            return;
-        }
-        while let Some((_, topic)) = self.next_due().filter(|(due, _)| *due <= now) {
-            let topic = Arc::clone(topic);
-            let Some(limits) = self.limits.get_mut(&topic) else {
-                return;
-            };
-            limits.last = Some(now);
-            if let Some(held) = limits.held.pop_front() {
-                self.held.forget(&held);
-                self.enqueue(Some(&topic), now, held.frame);
-            }
-            self.keep_to_queue_length(&topic);
-        }
-    }
-}
-
-// ---- dropping: the oldest messages go first, whole ------------------------------------------------------------------
-
-impl Outbox {
-    /// Whether a message fits into an empty outbox. If not, it counts as dropped.
-    fn may_fit(&mut self, frame: &Bytes) -> bool {
-        let fits = frame.len() <= MAX_MESSAGE;
-        self.dropped += u64::from(!fits);
-        fits
-    }
-
-    /// Drops the oldest messages of a topic with more waiting messages than the client's `queue_length`, while the
-    /// client is slow.
-    fn keep_to_queue_length(&mut self, topic: &Arc<str>) {
-        if self.writing.is_empty() && self.room != Some(0) {
-            return;
-        }
-        let limits = self.limits.get(topic);
-        let Some(most) = limits.and_then(|limits| limits.throttle.queue_length) else {
-            return;
-        };
-        let waiting = self.topics.iter().filter(|message| message.is_on(topic));
-        let mut surplus = waiting.count().saturating_sub(most);
-        let (mut index, mut before) = (0, 0);
-        self.topics.retain(|message| {
-            let stays = surplus == 0 || !message.is_on(topic);
-            if !stays {
-                surplus -= 1;
-                self.topic_bytes -= counted(&message.frame);
-                self.dropped += message.count();
-                before += usize::from(index < self.kept_old);
-            }
-            index += 1;
-            stays
-        });
-        self.kept_old -= before;
-    }
-
-    /// Drops messages that have waited too long, except the newest of each topic.
-    fn drop_old(&mut self, now: Instant) {
-        while let Some(next) = self.topics.get(self.kept_old) {
-            let age = if self.is_behind {
-                MAX_AGE_BEHIND
-            } else {
-                MAX_AGE
-            };
-            if !next.is_older(age, now) {
-                return;
-            }
-            let dropped = self.dropped;
-            if !self.drop_but_newest(self.kept_old) {
-                self.kept_old += 1;
-            }
-            self.is_behind |= self.dropped > dropped;
-        }
-    }
-
-    /// Drops the first topic message if it is too old to be taken only because a response follows it. Returns `false`
-    /// if it is not too old.
-    fn drop_stale(&mut self, now: Instant) -> bool {
-        let is_stale = |first: &QueuedMessage| first.is_older(self.fresh, now);
-        self.topics.front().is_some_and(is_stale) && self.drop_but_newest(0)
-    }
-
-    /// Drops a message, or a whole series, except the newest of the topic. Returns `true` if nothing is left.
-    fn drop_but_newest(&mut self, index: usize) -> bool {
-        let mut rest = self.topics.range_mut(index..);
-        let Some(message) = rest.next() else {
-            return true;
-        };
-        let is_newest = |topic: &Arc<str>| !rest.any(|newer| newer.is_on(topic));
-        if !message.topic.as_ref().is_some_and(is_newest) {
-            self.drop_message(index);
-            return true;
-        }
-        // The pieces of a message are dropped together.
-        if first_message(&message.frame) < message.frame.len() {
-            let newest = by_itself(last_messages(message.frame.clone(), 1), true);
-            self.dropped += message.count() - 1;
-            self.topic_bytes -= counted(&message.frame);
-            self.topic_bytes += counted(&newest);
-            message.frame = newest;
-        }
-        false
+        self.waiting.bytes -= counted(first);
+        let taken = first.split_to(length);
+        self.waiting.bytes += counted(first);
+        Some(taken)
     }
 
     /// Drops the message or the whole series at that index.
@@ -557,45 +309,33 @@ impl Outbox {
 
     fn take_out(&mut self, index: usize) -> Option<QueuedMessage> {
         let message = self.topics.remove(index)?;
-        self.topic_bytes -= counted(&message.frame);
+        self.waiting.forget(&message);
         if index < self.kept_old {
             self.kept_old -= 1;
         }
         Some(message)
     }
 
-    /// Drops topic messages, the oldest first, until at most [`MAX_TOPIC_BYTES`] are left. The oldest is the first in
-    /// the queue or the first held one. A series loses as many messages at once as necessary.
-    fn keep_bounded(&mut self) {
-        loop {
-            let cost = self.topic_bytes() + self.topic_count() * MESSAGE_BYTES;
-            let excess = cost.saturating_sub(MAX_TOPIC_BYTES);
-            if excess == 0 {
-                return;
-            }
-            let first = self.topics.front_mut();
-            let queued = first.as_ref().map_or(u64::MAX, |first| first.number);
-            let held = self.limits.values_mut();
-            let held = held.filter(|one| one.first_held().is_some_and(|held| held < queued));
-            if let Some(limits) = held.min_by_key(|limits| limits.first_held()) {
-                if let Some(oldest) = limits.held.pop_front() {
-                    self.held.forget(&oldest);
-                }
-                self.dropped += 1;
-            } else if let Some(QueuedMessage { frame, .. }) = first {
-                let (bytes, count) = first_messages(frame, excess);
-                self.dropped += count as u64;
-                if bytes < frame.len() {
-                    self.topic_bytes -= counted(frame);
-                    frame.advance(bytes);
-                    self.topic_bytes += counted(frame);
-                } else {
-                    self.take_out(0);
-                }
-            } else {
-                debug_assert!(false, "bytes are counted that no message has");
-                return;
-            }
+    /// Compares the sums with the messages that they are of. Builds without debug assertions omit it.
+    fn check_sums(&self) {
+        if !cfg!(debug_assertions) {
+            return;
         }
+        let held = self.limits.values().flat_map(|limits| &limits.held);
+        let mut waiting = Waiting::default();
+        held.chain(&self.topics).for_each(|one| waiting.add(one));
+        debug_assert_eq!(self.waiting, waiting);
+        debug_assert!(self.kept_old <= self.topics.len());
+        let queued = self.responses.iter();
+        let queued = queued.map(|(_, frame)| (frame.len(), frame.len()));
+        let writing = self.writing.iter().filter(|frame| frame.is_response);
+        let writing = writing.map(|frame| (frame.rest.len(), frame.length));
+        let responses = || queued.clone().chain(writing.clone());
+        let short = responses().filter(|(_, length)| *length <= SHORT);
+        debug_assert_eq!(self.short_bytes, short.map(|(rest, _)| rest).sum::<usize>());
+        debug_assert_eq!(
+            self.response_bytes,
+            responses().map(|(rest, _)| rest).sum::<usize>()
+        );
     }
 }

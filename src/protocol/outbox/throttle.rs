@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use super::message::{QueuedMessage, counted};
+use super::message::{QueuedMessage, Waiting};
 
 /// Longest time for which a message of more than [`MEDIUM`](crate::protocol::limits::MEDIUM) is held, because it
 /// uses the shared pool.
@@ -30,25 +30,6 @@ impl Throttle {
         held_back: 1,
         queue_length: None,
     };
-}
-
-/// The messages of all topics that are held back: how many, and the bytes of them that count.
-#[derive(Debug, Default)]
-pub(super) struct HeldBack {
-    pub(super) count: usize,
-    pub(super) bytes: usize,
-}
-
-impl HeldBack {
-    pub(super) fn add(&mut self, message: &QueuedMessage) {
-        self.count += 1;
-        self.bytes += counted(&message.frame);
-    }
-
-    pub(super) fn forget(&mut self, message: &QueuedMessage) {
-        self.count -= 1;
-        self.bytes -= counted(&message.frame);
-    }
 }
 
 /// A client's limits of one topic.
@@ -88,7 +69,7 @@ impl TopicLimits {
     }
 
     /// Drops the oldest messages beyond the number that may be held back.
-    pub(super) fn trim(&mut self, all: &mut HeldBack) {
+    pub(super) fn trim(&mut self, all: &mut Waiting) {
         while self.held.len() > self.throttle.held_back
             && let Some(oldest) = self.held.pop_front()
         {

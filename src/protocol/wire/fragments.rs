@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::frame::start_of;
+use super::fault::start_of;
 use crate::protocol::limits::MAX_FRAME;
 
 /// Pieces of one message: each of a longest frame's has a kilobyte.

@@ -10,14 +10,13 @@
 
 use bytes::Bytes;
 
+pub use super::fault::{FrameError, KEPT_START};
+use super::fault::{MAX_PREFIX, not_an_object, start_of};
 use super::json;
 pub use super::opening::{Foreign, Opening, is_host_line, opening};
 use super::series::{self, Series};
-use super::text;
 use crate::protocol::limits::{MAX_FRAME, MAX_NESTING, MEDIUM, SHORT};
 
-/// Bytes of a line that is not an object, kept for the error message.
-const MAX_PREFIX: usize = 32;
 /// Buffer that an idle reader may keep.
 const KEPT_BUFFER: usize = 16 * 1024;
 
@@ -34,6 +33,17 @@ enum Within {
     Line,
     /// In a line that has been reported already, and is skipped to the newline.
     SkippedLine,
+}
+
+/// The next part of a stream.
+#[derive(Debug)]
+pub enum FramePart {
+    /// Messages of a client on a topic of clients that can be forwarded unchanged.
+    Lines(Series),
+    /// Any other frame, or a whole WebSocket message.
+    Frame(RawFrame),
+    /// A part that is not a frame, with its first bytes, at most [`KEPT_START`].
+    Error(FrameError, Vec<u8>),
 }
 
 /// Takes bytes in chunks and returns frames, one at a time.
@@ -226,32 +236,24 @@ impl FrameReader {
         }
         // A newline stays unscanned. It belongs to the white space after the frame and does not count for a frame's
         // length.
-        let limit = self.limit;
-        let too_long = self.at - self.start > limit;
-        let (state, error) = match event {
+        let too_long = self.at - self.start > self.limit;
+        let state = match &event {
             None if !too_long => return None,
             Some(Event::Balanced) if kept && !too_long => return Some(Ok(self.take_frame())),
-            Some(Event::Balanced) => (Within::Between, FrameError::TooLong(limit)),
-            None => (Within::SkippedObject, FrameError::TooLong(limit)),
-            Some(Event::Fault(error)) => {
-                let state = match error {
-                    FrameError::Mismatch { .. } => Within::SkippedLine,
-                    FrameError::TooDeep => Within::SkippedObject,
-                    _ => Within::Between,
-                };
-                (state, error)
-            }
+            None | Some(Event::Fault(FrameError::TooDeep)) => Within::SkippedObject,
+            Some(Event::Fault(FrameError::Mismatch { .. })) => Within::SkippedLine,
+            Some(_) => Within::Between,
+        };
+        let error = match event {
+            Some(Event::Fault(error)) if !too_long => error,
+            _ => FrameError::TooLong(self.limit),
         };
         if kept {
             self.refused = start_of(self.buffer.get(self.start..self.at).unwrap_or_default());
         }
         self.state = state;
         self.start = self.at;
-        kept.then_some(Err(if too_long {
-            FrameError::TooLong(limit)
-        } else {
-            error
-        }))
+        kept.then_some(Err(error))
     }
 
     /// The frame that has just ended.
@@ -330,19 +332,11 @@ pub(super) fn append(buffer: &mut Vec<u8>, bytes: &[u8]) {
     buffer.extend_from_slice(bytes);
 }
 
-fn not_an_object(line: &[u8]) -> FrameError {
-    let prefix = line.get(..MAX_PREFIX).unwrap_or(line);
-    let text = String::from_utf8_lossy(prefix.trim_ascii_end());
-    let excerpt = text::excerpt(&text);
-    let is_cut = prefix.len() == MAX_PREFIX;
-    FrameError::NotAnObject(if is_cut { excerpt + "…" } else { excerpt })
-}
-
 const fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b'\r' | b'\n')
 }
 
-// ---- frames ---------------------------------------------------------------------------------------------------------
+// ---- one object -----------------------------------------------------------------------------------------------------
 
 /// One JSON object, as text. Its syntax within the outer braces is still unchecked.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -351,66 +345,6 @@ pub struct Frame {
     pub text: String,
     /// Whether a line end was right after it. Older raw-TCP clients send none, and need each frame in a separate write.
     pub newline: bool,
-}
-
-/// Why a part of the stream is not a frame. Nothing inside it is executed, and later frames work.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum FrameError {
-    /// The line does not begin with `{`; holds the beginning of it.
-    #[error("malformed frame: a frame is one JSON object on one line, got \"{0}\"")]
-    NotAnObject(String),
-    /// A newline came before the object was complete.
-    #[error("malformed frame: the line ended inside an object")]
-    LineEnded,
-    /// A newline came inside a string.
-    #[error("malformed frame: the line ended inside a string")]
-    LineEndedInString,
-    /// The stream ended before the object was complete.
-    #[error("malformed frame: the connection ended inside an object")]
-    StreamEnded,
-    /// A `]` in place of `}`, or the reverse.
-    #[error("malformed frame: {found} does not close {opener}")]
-    Mismatch {
-        /// The bracket that opened the innermost level.
-        opener: char,
-        /// The bracket in place of the right one.
-        found: char,
-    },
-    /// More than [`MAX_NESTING`] levels.
-    #[error("malformed frame: nested deeper than {MAX_NESTING} levels")]
-    TooDeep,
-    /// Text after the one object of a message.
-    #[error("malformed frame: a message must be one JSON object, but more text follows it")]
-    MoreBehind,
-    /// Longer than the limit, which it holds. The limit is [`MAX_FRAME`], unless the reader has another.
-    #[error("frame longer than {0} bytes, skipped")]
-    TooLong(usize),
-    /// Not UTF-8.
-    #[error("malformed frame: byte {at} is not UTF-8")]
-    NotUtf8 {
-        /// Index of the first bad byte within the frame.
-        at: usize,
-    },
-}
-
-/// The next part of a stream.
-#[derive(Debug)]
-pub enum FramePart {
-    /// Messages of a client on a topic of clients that can be forwarded unchanged.
-    Lines(Series),
-    /// Any other frame, or a whole WebSocket message.
-    Frame(RawFrame),
-    /// A part that is not a frame, with its first bytes, at most [`KEPT_START`].
-    Error(FrameError, Vec<u8>),
-}
-
-/// Bytes kept from the start of a frame that cannot be read. They contain the names and the id of the call that it may
-/// answer.
-pub const KEPT_START: usize = 1024;
-
-/// The kept bytes from the start of a frame that cannot be read.
-pub(super) fn start_of(bytes: &[u8]) -> Vec<u8> {
-    bytes.get(..KEPT_START).unwrap_or(bytes).to_vec()
 }
 
 /// A [`Frame`] that has only been scanned for its end, or a message. Another thread may parse it.
@@ -502,8 +436,6 @@ fn one_object(text: &[u8]) -> Result<bool, FrameError> {
         }
     }
 }
-
-// ---- the end of one JSON object: the state after a byte depends on the bytes so far, not on how they were cut up ----
 
 const _: () = assert!(MAX_NESTING <= u128::BITS as usize, "one bit per level");
 
@@ -609,7 +541,7 @@ impl Nesting {
 }
 
 /// The number of bytes from the start that are plain inside a string: no end, no escape and no newline.
-pub(crate) fn plain_in_string(bytes: &[u8]) -> usize {
+fn plain_in_string(bytes: &[u8]) -> usize {
     /// Most strings are keys and names, which are too short for blocks.
     const SHORT: usize = 16;
     /// Bytes that the compiler compares with a few vector instructions.

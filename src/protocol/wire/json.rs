@@ -1,8 +1,7 @@
-//! JSON that is lenient about numbers in the input and strict about numbers in the output.
+//! JSON that is passed on: the members of an object, and payloads, strict about numbers.
 //!
-//! Python's `json` writes `NaN`, `Infinity` and `-Infinity`, and any client may write `1e999`. In the input, these
-//! names become literals that overflow. So the parser accepts the frame, [`number`] returns a non-finite value, and the
-//! field's reader rejects it by name. In forwarded payloads a number that overflows becomes `null`.
+//! In forwarded payloads a number that overflows becomes `null`. `values.rs` has the values that the runtime reads
+//! itself.
 //!
 //! **Invariant:** one pass, linear in the length of any text. A [`Payload`] is read once, when it comes. Its text is
 //! one line of valid JSON, ready to be copied.
@@ -13,14 +12,13 @@ use std::fmt;
 use std::iter::repeat;
 use std::sync::Arc;
 
-use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::de::{DeserializeSeed, Deserializer, MapAccess, Visitor};
 use serde::{Serialize, Serializer};
 use serde_json::value::RawValue;
 
-/// The text that replaces `NaN` in the input. It is read as infinity, because no valid input distinguishes the two.
-pub(crate) const NAN: &str = "9e999";
-/// The text that replaces `Infinity` in the input. The sign before it stays.
-pub(crate) const INFINITY: &str = "1e999";
+pub(crate) use super::values::{Entries, INFINITY, NAN, entries, for_each};
+pub use super::values::{accept_literals, boolean, integer, number};
+
 /// Digits of the largest finite `f64` before the point. A shorter number without an exponent cannot overflow.
 const SAFE_DIGITS: usize = OVERFLOW.len() - 1;
 /// The least number that rounds to infinity: 2^1024 - 2^970, halfway between the largest `f64` and the next power of
@@ -30,39 +28,21 @@ const OVERFLOW: &[u8; 309] = b"\
     3028641669288791094655554785194040263065748867150582068190890200070838367627385484581771153176447573027\
     0069855571366959622842914819860834936475292719074168444365510704342711559699508093042880177904174497792";
 
-/// Replaces `NaN`, `Infinity` and `-Infinity` (outside strings, as whole tokens) by literals that overflow. The
-/// rest does not change.
-#[must_use]
-pub fn accept_literals(text: String) -> String {
-    let literal = |bytes: &[u8], at| {
-        let (name, literal, is_signed) = match bytes.get(at) {
-            Some(b'N') => ("NaN", NAN, false),
-            _ => ("Infinity", INFINITY, true),
-        };
-        match whole_token(bytes, at, name, is_signed) {
-            true => (at + name.len(), Some(literal)),
-            false => (at + 1, None),
-        }
-    };
-    let accepted = replaced(&text, |byte| matches!(byte, b'N' | b'I'), literal);
-    accepted.unwrap_or(text)
-}
-
 /// Replaces every number that overflows an `f64` by `null`. All other bytes of the valid JSON text `raw` do not change.
 #[must_use]
 pub fn strict(raw: &str) -> Cow<'_, str> {
-    let number = |bytes: &[u8], at| {
+    let checked = |bytes: &[u8], at| {
         let end = next_of(bytes, at, |byte| !is_numeric(byte)).unwrap_or(bytes.len());
         let overflows = overflows(bytes.get(at..end).unwrap_or_default());
         (end, overflows.then_some("null"))
     };
-    let strict = replaced(raw, |byte| matches!(byte, b'-' | b'0'..=b'9'), number);
+    let strict = replaced(raw, |byte| matches!(byte, b'-' | b'0'..=b'9'), checked);
     strict.map_or(Cow::Borrowed(raw), Cow::Owned)
 }
 
 /// The text with other tokens outside strings; `None` if nothing changes. `token` returns the end of the token at a byte
 /// that `begins` accepts, and what replaces it.
-fn replaced(
+pub(super) fn replaced(
     text: &str,
     begins: impl Fn(u8) -> bool,
     token: impl Fn(&[u8], usize) -> (usize, Option<&'static str>),
@@ -85,41 +65,6 @@ fn replaced(
     (copied > 0).then(|| output + text.get(copied..).unwrap_or_default())
 }
 
-/// The value of a JSON number, infinite if the literal overflows; `None` if `raw` is not a number.
-#[must_use]
-pub fn number(raw: &RawValue) -> Option<f64> {
-    let token = raw.get();
-    match token.as_bytes().first() {
-        Some(b'-' | b'0'..=b'9') => token.parse().ok(),
-        _ => None,
-    }
-}
-
-/// The value of a JSON number that is a whole number, 0 or more (`10.0` and `1e1` too; saturating); else `None`.
-#[must_use]
-pub fn integer(raw: &RawValue) -> Option<u64> {
-    if let Ok(integer) = raw.get().parse() {
-        return Some(integer);
-    }
-    let value = number(raw).filter(|value| value.is_finite() && *value >= 0.0)?;
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "not negative and without a fraction; saturation is documented"
-    )]
-    (value.fract() == 0.0).then_some(value as u64)
-}
-
-/// The value of a JSON `true` or `false`.
-#[must_use]
-pub fn boolean(raw: &RawValue) -> Option<bool> {
-    match raw.get() {
-        "true" => Some(true),
-        "false" => Some(false),
-        _ => None,
-    }
-}
-
 /// The text of a JSON string; `None` if `raw` is not a string, or if it has half of a surrogate pair, which is
 /// not valid text.
 #[must_use]
@@ -130,23 +75,6 @@ pub fn text(raw: &RawValue) -> Option<Cow<'_, str>> {
         return serde_json::from_str(quoted).ok().map(Cow::Owned);
     }
     Some(Cow::Borrowed(inner))
-}
-
-/// Whether `name` is a whole token at `at`, and not part of a longer one (`1Infinity`, `NaNs`).
-fn whole_token(bytes: &[u8], at: usize, name: &str, signed: bool) -> bool {
-    let before = |back: usize| at.checked_sub(back).and_then(|index| bytes.get(index));
-    let sign = usize::from(signed && before(1) == Some(&b'-'));
-    bytes
-        .get(at..)
-        .is_some_and(|rest| rest.starts_with(name.as_bytes()))
-        && !before(1 + sign).is_some_and(|byte| is_token(*byte))
-        && !bytes
-            .get(at + name.len())
-            .is_some_and(|byte| is_token(*byte))
-}
-
-const fn is_token(byte: u8) -> bool {
-    byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'.' | b'+' | b'-')
 }
 
 const fn is_numeric(byte: u8) -> bool {
@@ -234,53 +162,6 @@ pub(crate) fn members_into<'a>(
     let mut deserializer = serde_json::Deserializer::from_str(text);
     Members { names, values }.deserialize(&mut deserializer)?;
     deserializer.end()
-}
-
-/// The entries of a JSON array.
-#[derive(Default)]
-pub(crate) struct Entries<'a> {
-    /// The first entries, at most the requested number.
-    pub(crate) first: Vec<&'a RawValue>,
-    /// The last entry.
-    pub(crate) last: Option<&'a RawValue>,
-    /// The number of entries.
-    pub(crate) count: usize,
-}
-
-/// Reads the array `raw` and keeps at most `limit` entries, so a long array uses little memory. `None` if it is
-/// not an array.
-pub(crate) fn entries(raw: &RawValue, limit: usize) -> Option<Entries<'_>> {
-    let mut entries = Entries::default();
-    for_each(raw, |entry| {
-        if entries.count < limit {
-            entries.first.push(entry);
-        }
-        entries.count += 1;
-        entries.last = Some(entry);
-    })?;
-    Some(entries)
-}
-
-/// Passes each entry of the array `raw` to `take`. `None` if it is not an array.
-pub(crate) fn for_each<'a>(raw: &'a RawValue, take: impl FnMut(&'a RawValue)) -> Option<()> {
-    raw.deserialize_seq(Each(take)).ok()
-}
-
-struct Each<F>(F);
-
-impl<'a, F: FnMut(&'a RawValue)> Visitor<'a> for Each<F> {
-    type Value = ();
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a JSON array")
-    }
-
-    fn visit_seq<A: SeqAccess<'a>>(mut self, mut seq: A) -> Result<(), A::Error> {
-        while let Some(entry) = seq.next_element()? {
-            (self.0)(entry);
-        }
-        Ok(())
-    }
 }
 
 struct Members<'n, 'v, 'a> {
@@ -429,16 +310,6 @@ impl Eq for Payload {}
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A client may send a million entries in place of two.
-    #[test]
-    fn no_more_entries_are_kept_than_were_asked_for_but_all_are_counted() {
-        let raw = RawValue::from_string("[1,2,3,4]".to_owned()).unwrap();
-        let entries = entries(&raw, 2).unwrap();
-        let first: Vec<&str> = entries.first.iter().map(|entry| entry.get()).collect();
-        assert_eq!((first, entries.count), (vec!["1", "2"], 4));
-        assert_eq!(entries.last.map(RawValue::get), Some("4"));
-    }
 
     #[test]
     fn the_line_counts_if_it_is_another_text() {

@@ -2,10 +2,12 @@
 //!
 //! **Invariant:** bytes are split and checked here. `op` interprets them.
 
+mod fault;
 pub mod fragments;
 pub mod frame;
 pub mod json;
 pub mod opening;
 pub mod series;
 pub(crate) mod text;
+mod values;
 pub mod websocket;

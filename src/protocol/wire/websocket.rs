@@ -11,7 +11,8 @@ use std::collections::VecDeque;
 
 use bytes::{Buf, BufMut, Bytes, BytesMut};
 
-use super::frame::{FrameError, FramePart, RawFrame, append, start_of};
+use super::fault::start_of;
+use super::frame::{FrameError, FramePart, RawFrame, append};
 use crate::protocol::limits::MAX_FRAME;
 
 /// The kinds of frames.
@@ -391,6 +392,34 @@ impl MessageWriter {
     /// Makes `why` the reason in the close frame, for a peer that breaks a rule of the server.
     pub const fn refuse(&mut self, why: &'static str) {
         self.close_reason = Some((Some(POLICY_VIOLATION), why));
+    }
+}
+
+/// The two directions of a WebSocket.
+#[derive(Debug, Default)]
+pub struct WebSocket {
+    /// The input.
+    pub incoming: MessageReader,
+    /// The output.
+    pub outgoing: MessageWriter,
+}
+
+impl WebSocket {
+    /// Why no more messages follow. The close frame answers it.
+    pub const fn end(&mut self) -> Option<SocketEnd> {
+        let end = self.incoming.end();
+        if let Some(end) = end {
+            self.outgoing.answer(end);
+        }
+        end
+    }
+
+    /// The bytes that are to be sent next: the rest of the output, or else the answer to the latest ping.
+    pub fn output(&mut self) -> Option<&BytesMut> {
+        if self.outgoing.output().is_empty() {
+            self.outgoing.put_pong(&self.incoming.take_ping()?);
+        }
+        Some(self.outgoing.output()).filter(|output| !output.is_empty())
     }
 }
 

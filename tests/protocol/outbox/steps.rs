@@ -68,7 +68,7 @@ const ROWS: [(&str, &str); 17] = [
     ),
     (
         "a queue length bounds the queue of a slow client, which has been offered a message",
-        "qa2 a1 a2 a3 -a1 a4 b4 a5 b5 x2 w2 =a4,b4,a5,b5",
+        "qa2 a1 a2 a3 -a1 a4 b4 a5 b5 x2 w2 =a4,b4,a5,b5 ~a100/1 a6 a7 =a6",
     ),
     (
         "a queue length counts no other topic's old message",

@@ -1,0 +1,142 @@
+//! The frames of answers and requests to one client: responses, goals and statuses.
+//!
+//! **Invariant:** an answer has the `id` of its request, unchanged.
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use super::Encoder;
+use crate::protocol::catalog::table;
+use crate::protocol::wire::json::Payload;
+
+table! {
+    /// The severity of a status, the lowest first.
+    pub enum Level of name {
+        /// Information.
+        Info = "info",
+        /// Something was unexpected, but the operation was done.
+        Warning = "warning",
+        /// The operation was not done.
+        Error = "error",
+    }
+}
+
+table! {
+    /// The form in which `values` of a response with `result: false` gives the reason.
+    #[derive(Default)]
+    pub enum ErrorForm of name {
+        /// An object, as in any other response. This is the default over raw TCP.
+        #[default]
+        Object = "object",
+        /// The text of `status`, as in `rosbridge_suite`. This is the default over WebSocket.
+        Text = "text",
+    }
+}
+
+/// The answer to a service call. `values` is an object, and `status` is empty on success. `values` of another client
+/// are forwarded.
+#[must_use]
+pub fn response(
+    service: &str,
+    id: Option<&Payload>,
+    values: &impl Serialize,
+    result: bool,
+    status: &str,
+) -> Bytes {
+    Encoder::op("service_response")
+        .value("service", service)
+        .optional("id", id)
+        .value("values", values)
+        .value("result", &result)
+        .value("status", status)
+        .end()
+}
+
+/// The answer to a failed call. `status` has the reason; `values` is `{}` or has the reason.
+#[must_use]
+pub fn failure(service: &str, id: Option<&Payload>, status: &str, form: ErrorForm) -> Bytes {
+    match form {
+        ErrorForm::Object => response(service, id, &Empty {}, false, status),
+        ErrorForm::Text => response(service, id, &status, false, status),
+    }
+}
+
+/// Feedback of a goal.
+#[must_use]
+pub fn action_feedback(action: &str, id: Option<&Payload>, values: &impl Serialize) -> Bytes {
+    Encoder::op("action_feedback")
+        .value("action", action)
+        .optional("id", id)
+        .value("values", values)
+        .end()
+}
+
+/// The end of a goal. `status` is a value of `action_msgs/msg/GoalStatus`. If `result` is false, `values` has the
+/// reason.
+#[must_use]
+pub fn action_result(
+    action: &str,
+    id: Option<&Payload>,
+    values: &impl Serialize,
+    status: u8,
+    result: bool,
+) -> Bytes {
+    Encoder::op("action_result")
+        .value("action", action)
+        .optional("id", id)
+        .value("values", values)
+        .value("status", &status)
+        .value("result", &result)
+        .end()
+}
+
+/// A goal for an action server that is a client, under an id of the runtime. `args` are forwarded.
+#[must_use]
+pub fn action_goal(
+    action: &str,
+    id: &str,
+    type_name: Option<&str>,
+    args: &Payload,
+    feedback: bool,
+) -> Bytes {
+    Encoder::with_room("send_action_goal", args)
+        .value("action", action)
+        .value("id", id)
+        .optional("action_type", type_name)
+        .value("args", args)
+        .value("feedback", &feedback)
+        .end()
+}
+
+/// Asks the action server of a client to cancel a goal.
+#[must_use]
+pub fn cancellation(action: &str, id: &str) -> Bytes {
+    Encoder::op("cancel_action_goal")
+        .value("action", action)
+        .value("id", id)
+        .end()
+}
+
+/// A status.
+#[must_use]
+pub fn status(level: Level, msg: &str, id: Option<&Payload>) -> Bytes {
+    Encoder::op("status")
+        .value("level", level.name())
+        .value("msg", msg)
+        .optional("id", id)
+        .end()
+}
+
+/// A call for a provider that is a client, under an id of the runtime. `args` are forwarded.
+#[must_use]
+pub fn call(service: &str, id: &str, args: &Payload) -> Bytes {
+    Encoder::with_room("call_service", args)
+        .value("service", service)
+        .value("id", id)
+        .value("args", args)
+        .end()
+}
+
+/// `{}`, the `values` of a response that has none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Empty {}
