@@ -15,6 +15,8 @@
 //! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, through the question's reader, or
 //! from another node. The [`node::Reply`] is the way back.
 //!
+//! The registry keeps its tables in `graph`, which has no actors.
+//!
 //! The documentation of each message gives its meaning and its sender. The drawing in `ARCHITECTURE.md` has all of
 //! them.
 //!
@@ -24,6 +26,7 @@
 pub mod arm;
 pub mod compute;
 pub mod gateway;
+pub mod graph;
 pub mod node;
 pub mod panics;
 #[cfg(feature = "record")]

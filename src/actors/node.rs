@@ -30,6 +30,7 @@ use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::op::{Arguments, GoalStatus};
+use crate::protocol::ros::rosapi::Census;
 use crate::protocol::wire::json::Payload;
 pub use crate::services::{Address, Answered, Ask, Callable};
 
@@ -661,3 +662,60 @@ impl ActionClient {
         self.link.send(FrameKind::End, frame, None);
     }
 }
+
+// ---- to the registry, from the runtime, rosapi and the recorder -----------------------------------------------------
+
+/// The runtime's nodes. From the runtime, once, before any client is accepted.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Attach(pub Nodes);
+
+/// Requests the topics and services of the clients. From `rosapi`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "Census")]
+pub struct TakeCensus;
+
+/// A message or call in the registry, as the tap gets it.
+pub enum Tapped<'a> {
+    /// A message on a topic of the runtime, from a node or a client, as the whole `publish` frame.
+    Published(Topic, &'a Bytes),
+    /// A client's call of one of the runtime's services.
+    Called {
+        /// The client.
+        from: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The caller's `id`, if there is one.
+        id: Option<&'a Payload>,
+        /// The arguments.
+        args: &'a Payload,
+    },
+    /// The response to such a call, as the whole frame.
+    Answered {
+        /// The client.
+        to: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The frame.
+        frame: &'a Bytes,
+    },
+}
+
+/// Gets every message and call of the runtime, on the registry's thread. It must not block.
+pub type Tap = Box<dyn FnMut(Tapped<'_>) + Send>;
+
+/// Sets or removes the tap. While a tap is set, every topic of the runtime counts as subscribed. From the recorder.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct SetTap(pub Option<Tap>);
+
+/// The registry rejects new calls, and the calls and goals that wait for clients, with this reason. From the runtime,
+/// when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct RefuseCalls(pub &'static str);
+
+/// Every connection sends its queue and ends. From the runtime, when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct FinishAll;

@@ -19,16 +19,18 @@ use tokio::time::{Instant, sleep, timeout_at};
 
 use crate::actors::arm::sim::ArmSim;
 use crate::actors::compute::workers::WorkerPool;
-use crate::actors::gateway::connection::admission::{Admission, MAX_NEWCOMERS, Slots};
-use crate::actors::gateway::listener;
+use crate::actors::gateway::connection::admission::Admission;
+use crate::actors::gateway::listener::accept;
 use crate::actors::gateway::registry::{Attach, FinishAll, RefuseCalls, Registry};
 use crate::actors::node::{Nodes, ShutDown};
 use crate::actors::panics::contain;
 #[cfg(feature = "record")]
 use crate::actors::recorder::{self, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::listening;
 use crate::actors::resources::long_work::THREADS;
 use crate::actors::resources::open_files::{Room, make_room};
+use crate::actors::resources::places::{MAX_NEWCOMERS, Slots};
 use crate::actors::resources::priority::lower_priority;
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::start;
@@ -57,7 +59,7 @@ const RECORD_TIME: Duration = Duration::from_millis(250);
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The runtime cannot listen on the address.
-    #[error("cannot listen on {address}: {}", listener::remedy(source))]
+    #[error("cannot listen on {address}: {}", listening::remedy(source))]
     Bind {
         /// The address.
         address: SocketAddr,
@@ -148,12 +150,7 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     let admission = Arc::new(admission(options, room.newcomers));
     let listen = |socket| {
         let (admission, gauges) = (Arc::clone(&admission), Arc::clone(&gauges));
-        actix_rt::spawn(listener::accept(
-            socket,
-            admission,
-            registry.clone(),
-            gauges,
-        ))
+        actix_rt::spawn(accept(socket, admission, registry.clone(), gauges))
     };
     let listeners: Vec<_> = sockets.into_iter().map(listen).collect();
     announce(address);
@@ -254,13 +251,13 @@ fn start_nodes<const N: usize>(
 /// The requested address. For the default one also its IPv6 counterpart, if it is available.
 fn bind(options: &Options) -> Result<Vec<TcpListener>, RunError> {
     let address = options.bind;
-    let first = listener::bind(address).map_err(|source| RunError::Bind { address, source })?;
+    let first = listening::bind(address).map_err(|source| RunError::Bind { address, source })?;
     let mut sockets = vec![first];
     if address == DEFAULT_BIND {
         let twin = SocketAddr::new(IpAddr::V6(Ipv6Addr::LOCALHOST), address.port());
-        match listener::bind(twin) {
+        match listening::bind(twin) {
             Ok(socket) => sockets.push(socket),
-            Err(error) => listener::report_twin(twin, &error),
+            Err(error) => listening::report_twin(twin, &error),
         }
     }
     Ok(sockets)

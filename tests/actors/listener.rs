@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use crate::system::in_real_time;
 use actix::prelude::*;
-use pendularm::actors::gateway::listener::{accept, bind};
+use pendularm::actors::gateway::listener::accept;
 use pendularm::actors::gateway::registry::Registry;
-use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::resources::{gauges::Gauges, listening::bind};
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
 use tokio::task::JoinHandle;

@@ -5,7 +5,8 @@
 
 use std::time::Duration;
 
-use crate::actors::resources::memory::{LONG_ANSWERS, LONG_FRAMES, SHORT};
+use crate::actors::graph::registrations::MAX_REGISTERED;
+use crate::actors::resources::memory::{LONG_ANSWERS, LONG_FRAMES, MAX_BACKLOG, SHORT};
 use crate::protocol::limits::{DEFAULT_CLIENTS, MAX_FRAME, MEDIUM};
 use crate::protocol::outbox::MAX_TOPIC_BYTES;
 
@@ -39,8 +40,6 @@ const _: () = assert!(
         <= MAX_MEMORY
 );
 
-/// Most places that are kept for HTTP, WebSocket and the program's own commands. A small `--clients` keeps fewer.
-pub const KEPT_PLACES: usize = 16;
 /// Time for a client to show that it may use a kept place, if no other place is free. A client also waits this long for
 /// a kept place to become free.
 pub const OPENING_TIME: Duration = Duration::from_secs(1);
@@ -48,14 +47,6 @@ pub const OPENING_TIME: Duration = Duration::from_secs(1);
 pub const MAX_RESPONSES_WAITING: usize = SHORT;
 /// Timeout of a forwarded call if its caller sets none.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
-/// Bytes of responses that may wait for one connection. Above this limit, calls to it as a provider and answers to its
-/// own calls are refused. At that point the connection is not read, but other clients could still send to it.
-pub const MAX_BACKLOG: usize = 2 * MAX_RESPONSES_WAITING;
-/// Bytes that the registry keeps of one connection: subscriptions, advertisements, services, and calls and goals that
-/// wait for other clients.
-pub const MAX_REGISTERED: usize = 128 * 1024;
-/// Bytes of each entry in the tables, without three times its names.
-pub const ENTRY_BYTES: usize = 640;
 /// Timeout of a request's head from its first bytes, and of a client's token from the connection. It is enough for a
 /// slow line, and too short to occupy a place.
 pub const HEAD_TIME: Duration = Duration::from_secs(5);
@@ -87,5 +78,3 @@ pub(super) const DISCARD_BYTES: usize = 16 * KIB * KIB;
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Interval of checks whether a client that has stopped sending, or is not read, has closed its socket.
 pub(super) const CLOSED_CHECK: Duration = Duration::from_millis(250);
-/// Most waiting computations of one connection, besides the running one. At this limit the client is not read.
-pub const MAX_COMPUTATIONS_WAITING: usize = 16;

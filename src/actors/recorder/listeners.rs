@@ -6,7 +6,7 @@ use bytes::Bytes;
 
 use super::limits::MAX_RECORDED_FRAME;
 use crate::actors::arm::sim::{ArmEvent, ArmListener, StepEvent};
-use crate::actors::gateway::registry::{Tap, Tapped};
+use crate::actors::node::{Tap, Tapped};
 use crate::record::{Content, write_note};
 
 /// The arm's inputs and states. `put` returns whether it has accepted an entry.

@@ -19,7 +19,7 @@ use self::limits::MAX_RECORD_BYTES;
 pub use self::requests::{NotRecorded, RecordTo, Recorded, StartRecording, StopRecording};
 use self::tape::{Begun, TapeTarget};
 use crate::actors::arm::sim::SetListener;
-use crate::actors::gateway::registry::SetTap;
+use crate::actors::node::SetTap;
 use crate::actors::node::{Call, Nodes};
 use crate::protocol::catalog::Service;
 use crate::record::RunSettings;

@@ -22,6 +22,9 @@ const MIB: usize = 1024 * KIB;
 pub const LONG_FRAMES: usize = 3;
 /// Most bytes of long answers at once, finished or being computed: one of a million steps, or many of ten thousand.
 pub const LONG_ANSWERS: usize = 96 * MIB;
+/// Bytes of short responses that may wait for one client. Above this limit, calls to it as a provider and answers to
+/// its own calls are refused. The client is not read at half of it, but other clients could still send to it.
+pub const MAX_BACKLOG: usize = 2 * SHORT;
 /// The bytes of an answer per permit of the pool.
 const ANSWER_PART: usize = 16 * KIB;
 

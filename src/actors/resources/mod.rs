@@ -1,12 +1,14 @@
-//! Shared resources of all nodes: counted memory, measured work time, threads for long work, and questions to the
-//! operating system.
+//! Shared resources of all nodes: places, counted memory, measured work time, threads for long work, and the operating
+//! system's sockets and files.
 //!
 //! **Invariant:** nothing here imports a node, so every node can use it.
 
 pub mod gauges;
+pub mod listening;
 pub mod long_work;
 pub mod memory;
 pub mod open_files;
+pub mod places;
 pub mod priority;
 pub mod turns;
 pub mod unread;

@@ -76,7 +76,7 @@ fn room_with(files: usize, wanted: Room, asks_token: bool) -> Room {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::actors::gateway::connection::admission::MAX_NEWCOMERS;
+    use crate::actors::resources::places::MAX_NEWCOMERS;
 
     #[test]
     fn there_are_files_for_every_client_that_is_served_and_for_unauthenticated_ones() {

@@ -10,7 +10,7 @@ use bytes::Bytes;
 use serde_json::Value;
 use tokio::time::sleep;
 
-use crate::actors::gateway::registry::TakeCensus;
+use crate::actors::node::TakeCensus;
 use crate::actors::node::{Address, Answered, Ask, Call, Callable, Nodes};
 use crate::actors::resources::long_work::{WorkKind, WorkPermit};
 use crate::protocol::catalog::{Rosapi, Service};

@@ -3,14 +3,15 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use pendularm::actors::gateway::connection::admission::{
-    MAX_AUTH_BYTES, MAX_NEWCOMERS, WRONG_TOKEN_TIME,
-};
+use pendularm::actors::compute::computations::MAX_COMPUTATIONS_WAITING;
+use pendularm::actors::gateway::connection::admission::{MAX_AUTH_BYTES, WRONG_TOKEN_TIME};
 use pendularm::actors::gateway::limits::{
-    DEFAULT_TIMEOUT, ENTRY_BYTES, FRAME_TIME, HEAD_TIME, KEPT_PLACES, LINGER, MAX_BACKLOG,
-    MAX_COMPUTATIONS_WAITING, MAX_REGISTERED, MAX_RESPONSES_WAITING, OPENING_TIME, RESPONSES_TIME,
-    STALL_LIMIT,
+    DEFAULT_TIMEOUT, FRAME_TIME, HEAD_TIME, LINGER, MAX_RESPONSES_WAITING, OPENING_TIME,
+    RESPONSES_TIME, STALL_LIMIT,
 };
+use pendularm::actors::graph::registrations::{ENTRY_BYTES, MAX_REGISTERED};
+use pendularm::actors::resources::memory::MAX_BACKLOG;
+use pendularm::actors::resources::places::{KEPT_PLACES, MAX_NEWCOMERS};
 use pendularm::actors::ros::tf_web::{MAX_FRAME_SUBSCRIPTIONS, MAX_FRAMES};
 use pendularm::options::DEFAULT_CLIENTS;
 use pendularm::protocol::limits::{MAX_FRAME, MAX_NAME, MEDIUM, SHORT};

@@ -8,7 +8,6 @@
 //! deadline expires only for a client that is finishing, or for which responses or a long message have waited without a
 //! break. One poll writes a bounded number of bytes.
 
-use std::collections::VecDeque;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -20,13 +19,13 @@ use tokio::time::Instant;
 
 use super::session::HeldPlace;
 use super::transport::{ClientLost, ClientStream, Transport};
+use crate::actors::compute::computations::Computations;
 use crate::actors::gateway::limits::{
-    LINGER, MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES,
+    LINGER, MAX_RESPONSES_WAITING, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES,
 };
 use crate::actors::gateway::registry::{Registry, Request, ToClient};
 use crate::actors::panics::{Contained, contain};
 use crate::actors::resources::gauges::Gauges;
-use crate::actors::resources::memory::SHORT;
 use crate::actors::resources::turns::{Timer, end_turn};
 use crate::actors::resources::unread::Ends;
 use crate::protocol::catalog::Service;
@@ -58,10 +57,8 @@ pub struct Connection<S> {
     pub(super) progress: Instant,
     /// Start of the time in which responses have waited without a break.
     responses_since: Option<Instant>,
-    /// Heavy calls that wait for the running one, each with the length of its frame.
-    computations: VecDeque<(Request, usize)>,
-    /// Whether a heavy call runs.
-    is_running: bool,
+    /// Its heavy calls.
+    computations: Computations<Request>,
     /// Set when nothing more is read. Queued messages are still sent.
     pub(super) is_finishing: bool,
     /// Set if the client has no place, uses another protocol or violates a rule. It gets the reason, and its input is
@@ -93,8 +90,7 @@ impl<S: ClientStream> Connection<S> {
             gone: Arc::default(),
             progress: now,
             responses_since: None,
-            computations: VecDeque::new(),
-            is_running: false,
+            computations: Computations::default(),
             is_finishing: false,
             is_refused: false,
             reader_has_ended: false,
@@ -126,7 +122,7 @@ impl<S: ClientStream> Connection<S> {
             ToClient::Respond { frame, service } => {
                 self.push_response(frame, service.map_or(&[], Service::supersedes));
                 if service.is_some_and(Service::is_computation) {
-                    self.is_running = false;
+                    self.computations.end();
                     self.start_computation();
                 }
             }
@@ -237,10 +233,7 @@ impl<S: ClientStream> Connection<S> {
 
     /// Whether the reader may go on: neither too many responses nor too many computations wait, or it is to end.
     pub(super) fn may_read(&self) -> bool {
-        let waiting = &self.computations;
-        let bytes: usize = waiting.iter().map(|(_, length)| length).sum();
-        let are_too_many = waiting.len() >= MAX_COMPUTATIONS_WAITING || bytes >= SHORT;
-        self.is_finishing || (self.may_compute() && !are_too_many)
+        self.is_finishing || (self.may_compute() && !self.computations.is_full())
     }
 
     /// Whether another computation may start: not too many responses wait.
@@ -250,30 +243,27 @@ impl<S: ClientStream> Connection<S> {
 
     /// Queues a heavy call, whose frame had `length` bytes.
     pub(super) fn enqueue_computation(&mut self, request: Request, length: usize) {
-        self.computations.push_back((request, length));
+        self.computations.push(request, length);
         self.start_computation();
     }
 
-    /// Starts the next computation if none runs and not too many responses wait. They run in order of arrival.
+    /// Starts the next computation if none runs and not too many responses wait.
     fn start_computation(&mut self) {
-        if !self.is_running
-            && self.may_compute()
-            && let Some((request, _)) = self.computations.pop_front()
+        if self.may_compute()
+            && let Some(request) = self.computations.start()
         {
-            self.is_running = true;
             self.registry.do_send(request);
         }
     }
 
     /// Whether a computation runs or waits.
     pub(super) fn is_computing(&self) -> bool {
-        self.is_running || !self.computations.is_empty()
+        !self.computations.is_empty()
     }
 
     /// The client sends nothing more. Its output remains to be written, but it no longer waits for computations.
     pub(super) fn leave(&mut self) {
-        self.computations.clear();
-        self.is_running = false;
+        self.computations = Computations::default();
         self.gone.store(true, Ordering::Relaxed);
         self.is_finishing = true;
     }

@@ -10,10 +10,10 @@ use std::task::{Poll, ready};
 use bytes::BytesMut;
 use tokio::time::Instant;
 
-use super::admission::HeldSlot;
 use super::session::{ClientSession, HeldPlace, Opened};
 use super::transport::{ClientStream, Transport};
-use crate::actors::gateway::registry::{Refused, Request};
+use crate::actors::gateway::registry::Request;
+use crate::actors::resources::places::{HeldSlot, Refused};
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Incoming, Op, Verbosity};
 use crate::web::serve::{self, Gate};
@@ -24,16 +24,16 @@ pub(super) type Newcomer = (HeldSlot, Refused);
 /// Admits a client. A newcomer gets a place, or the reason why there is none, with its first request.
 struct HttpGate<'a> {
     session: &'a ClientSession,
-    newcomer: RefCell<Option<Newcomer>>,
-    place: RefCell<Option<HeldPlace>>,
+    /// The client. `None` while a newcomer waits for its place, and if it got none.
+    client: RefCell<Option<Result<HeldPlace, Newcomer>>>,
 }
 
 impl HttpGate<'_> {
     /// Returns the reason when a newcomer is evicted before its first request. After that the response has the reason.
     async fn evicted(&self) -> String {
         let why = poll_fn(|cx| {
-            let mut newcomer = self.newcomer.borrow_mut();
-            let Some((slot, why)) = &mut *newcomer else {
+            let mut client = self.client.borrow_mut();
+            let Some(Err((slot, why))) = &mut *client else {
                 return Poll::Pending;
             };
             let _ = ready!(Pin::new(slot).poll(cx));
@@ -45,12 +45,13 @@ impl HttpGate<'_> {
 
 impl Gate for HttpGate<'_> {
     async fn admit(&self) -> Result<(), String> {
-        let newcomer = self.newcomer.take();
-        if let Some((mut slot, _)) = newcomer {
-            let place = self.session.wait_for_place(&mut slot).await;
+        let mut client = self.client.take();
+        if let Some(Err((slot, _))) = &mut client {
+            let place = self.session.wait_for_place(slot).await;
             let place = place.map_err(|why| self.session.turn_away(why))?;
-            self.place.replace(Some(place));
+            client = Some(Ok(place));
         }
+        self.client.replace(client);
         Ok(())
     }
 
@@ -69,19 +70,14 @@ impl ClientSession {
         due: Instant,
         client: Result<HeldPlace, Newcomer>,
     ) -> Option<Opened<S>> {
-        let (place, newcomer) = match client {
-            Ok(place) => (Some(place), None),
-            Err(newcomer) => (None, Some(newcomer)),
-        };
         let gate = HttpGate {
             session: self,
-            newcomer: RefCell::new(newcomer),
-            place: RefCell::new(place),
+            client: RefCell::new(Some(client)),
         };
         let site = (&self.admission.site, self.ends.local);
         let served = serve::serve(stream, first, due, site, &gate, gate.evicted());
         let (stream, behind) = served.await?;
-        let place = gate.place.into_inner()?;
+        let place = gate.client.into_inner()?.ok()?;
         let quiet = Request {
             from: place.id,
             incoming: Incoming {

@@ -35,7 +35,6 @@ use crate::protocol::op::{
 };
 use crate::protocol::wire::fragments::{Fragments, MAX_AGE};
 use crate::protocol::wire::frame::{Foreign, FrameError, FramePart, RawFrame, is_host_line};
-use crate::protocol::wire::json::Payload;
 
 /// The error for a frame that takes longer than [`FRAME_TIME`].
 const TOO_SLOW: &str = "a frame that has begun must be complete within a minute";
@@ -50,8 +49,8 @@ type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 pub(super) struct ClientReader {
     step: ReadStep,
     id: ConnectionId,
-    /// Pieces of a message and the memory permit. While a frame is parsed, its future owns them.
-    held: HeldInput,
+    /// Pieces of a message and the memory permit. While a frame is parsed, its future owns it.
+    parser: FrameParser,
     /// Received bytes that the transport has not read yet.
     chunk: BytesMut,
     /// The stream has ended. Earlier bytes may still wait.
@@ -81,7 +80,7 @@ enum ReadStep {
     /// It waits for the memory permit of the incoming long frame.
     WaitingForRoom(BoxFuture<Result<Permit, ClientLost>>),
     /// It reads a frame.
-    Parsing(BoxFuture<(HeldInput, Parsed)>),
+    Parsing(BoxFuture<(FrameParser, Parsed)>),
     /// It waits until an op has taken effect.
     Performing(BoxFuture<()>),
     /// The client has stopped sending, but may still read. The reader waits for the answers to its calls and
@@ -106,12 +105,12 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
                 ReadStep::Reading => ready!(reader.poll_chunk(client, cx)),
                 ReadStep::Cutting => ready!(reader.poll_cut(client, cx)),
                 ReadStep::WaitingForRoom(room) => ready!(room.as_mut().poll(cx)).map(|permit| {
-                    reader.held.permit = Some(permit);
+                    reader.parser.permit = Some(permit);
                     ReadStep::Reading
                 }),
                 ReadStep::Parsing(frame) => {
-                    let (held, parsed) = ready!(frame.as_mut().poll(cx));
-                    reader.held = held;
+                    let (parser, parsed) = ready!(frame.as_mut().poll(cx));
+                    reader.parser = parser;
                     Ok(match parsed {
                         Ok(Some((incoming, length))) => reader.perform(client, incoming, length),
                         Ok(None) => ReadStep::Cutting,
@@ -157,7 +156,7 @@ impl ClientReader {
         Self {
             step: ReadStep::Reading,
             id,
-            held: HeldInput::default(),
+            parser: FrameParser::default(),
             chunk: first,
             has_ended: false,
             is_last: false,
@@ -211,7 +210,7 @@ impl ClientReader {
         }
         ready!(self.poll_may_read(client, cx))?;
         let transport = client.transport()?;
-        self.held.give_back(transport.is_long_coming());
+        self.parser.give_back(transport.is_long_coming());
         let part = transport.cut()?;
         let is_long_coming = transport.is_long_coming();
         if part.is_some() || !transport.is_unfinished() {
@@ -239,10 +238,10 @@ impl ClientReader {
             FramePart::Frame(frame) => {
                 (self.speaks_json, client.is_single) = (true, !frame.newline());
                 let memory = client.gauges.memory().clone();
-                let mut held = mem::take(&mut self.held);
+                let mut parser = mem::take(&mut self.parser);
                 ReadStep::Parsing(Box::pin(async move {
-                    let parsed = held.read_frame(&memory, frame).await;
-                    (held, parsed)
+                    let parsed = parser.read_frame(&memory, frame).await;
+                    (parser, parsed)
                 }))
             }
             FramePart::Error(FrameError::NotAnObject(start), _)
@@ -268,7 +267,7 @@ impl ClientReader {
             // close frame.
             self.has_ended = true;
             self.chunk.clear();
-        } else if is_long_coming && self.held.permit.is_none() {
+        } else if is_long_coming && self.parser.permit.is_none() {
             self.frame_due = None;
             let (memory, ends) = (client.gauges.memory().clone(), client.ends);
             // The end of the stream comes after bytes that are not read without a permit.
@@ -299,7 +298,7 @@ impl ClientReader {
             let begin = || Instant::now() + FRAME_TIME;
             let is_unfinished = transport.is_unfinished();
             let late = is_unfinished.then(|| *self.frame_due.get_or_insert_with(begin));
-            let began = self.held.fragments.began().map(Instant::from_std);
+            let began = self.parser.fragments.began().map(Instant::from_std);
             let old = began.map(|began| began + MAX_AGE + LOOK_AGAIN);
             ready!(self.timer.poll(late.into_iter().chain(old).min(), cx));
             let now = Instant::now();
@@ -308,8 +307,8 @@ impl ClientReader {
                 client.refuse(TOO_SLOW);
                 return Poll::Ready(Ok(()));
             }
-            self.held.fragments.forget_old(now.into_std());
-            self.held.give_back(transport.is_long_coming());
+            self.parser.fragments.forget_old(now.into_std());
+            self.parser.give_back(transport.is_long_coming());
         }
     }
 
@@ -366,7 +365,7 @@ impl ClientReader {
         let request = Request {
             from: self.id,
             incoming,
-            permit: self.held.permit.clone(),
+            permit: self.parser.permit.clone(),
         };
         if is_computation {
             client.enqueue_computation(request, length);
@@ -426,9 +425,9 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for Discarder {
 
 // ---- from bytes to an op --------------------------------------------------------------------------------------------
 
-/// Input that the client keeps in memory between its frames.
+/// The input that a client keeps in memory between its frames.
 #[derive(Default)]
-struct HeldInput {
+struct FrameParser {
     /// Frames that come in pieces.
     fragments: Fragments,
     /// The memory permit of the client's long frame. It is held until the frame was performed and its answers written,
@@ -440,21 +439,22 @@ struct HeldInput {
 /// An error is the reason why the client is refused.
 type Parsed = Result<Option<(Incoming, usize)>, &'static str>;
 
-impl HeldInput {
-    /// Takes a memory permit. A client holds at most one, so two clients cannot block each other.
+impl FrameParser {
+    /// Takes the memory permit, unless the client has it.
     async fn take_room(&mut self, memory: &Memory) {
         if self.permit.is_none() {
             self.permit = Some(memory.long_frame().await);
         }
     }
 
-    /// Releases the client's memory permit, unless a long frame `is_coming` or pieces of one are kept.
+    /// Releases the memory permit, unless a long frame `is_coming` or pieces of one are kept.
     fn give_back(&mut self, is_coming: bool) {
         if !is_coming && self.fragments.allocated() <= SHORT {
             self.permit = None;
         }
     }
 
+    /// Parses a frame. A piece of a message is kept, and the last one gives the op of the message.
     async fn read_frame(&mut self, memory: &Memory, frame: RawFrame) -> Parsed {
         let length = frame.len();
         if length > MEDIUM {
@@ -477,7 +477,7 @@ impl HeldInput {
         let whole = match self.fragments.take(piece, Instant::now().into_std()) {
             Ok(Some(whole)) => whole,
             Ok(None) => return Ok(None),
-            Err((why, start)) => return Ok(Some((under_id(op::read_start(&start, &why), id), 0))),
+            Err((why, start)) => return Ok(Some((op::read_start(&start, &why).under_id(id), 0))),
         };
         let length = whole.bytes();
         let join = move || RawFrame::of_message(whole.text().into_bytes());
@@ -486,7 +486,7 @@ impl HeldInput {
                 let op = Err(Problem::NotAFrame(NESTED_FRAGMENT.to_owned()).into());
                 (Incoming { id, op }, length)
             }
-            Err(OpError::Status(Problem::NotAFrame(_))) => (under_id(whole, id), length),
+            Err(OpError::Status(Problem::NotAFrame(_))) => (whole.under_id(id), length),
             _ => (whole, length),
         }))
     }
@@ -497,23 +497,10 @@ async fn parse(
     length: usize,
     frame: impl FnOnce() -> RawFrame + Send + 'static,
 ) -> Result<Option<Incoming>, &'static str> {
-    let parse = move || {
-        Some(match frame().decode()? {
-            Ok(frame) => op::read(&frame.text),
-            Err((error, start)) => op::read_start(&start, &error),
-        })
-    };
+    let parse = move || op::read_raw(frame());
     if length <= SHORT_WORK {
         return Ok(parse());
     }
     let parsed = run_long_work(WorkKind::of(length), parse).await;
     parsed.ok_or("a frame could not be read")
-}
-
-/// Gives an error the id of the pieces. An op, such as a bad answer, keeps its own id.
-fn under_id(incoming: Incoming, id: Option<Payload>) -> Incoming {
-    match incoming.op {
-        Err(_) => Incoming { id, ..incoming },
-        Ok(_) => incoming,
-    }
 }

@@ -11,17 +11,15 @@ use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
-use super::admission::{
-    Admission, AuthError, HeldSlot, WRONG_TOKEN_TIME, authenticate, first_frame, is_command,
-};
+use super::admission::{Admission, WRONG_TOKEN_TIME, first_frame};
 use super::transport::{ClientStream, Transport};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{FRAME_TIME, HEAD_TIME, LOOK_AGAIN, OPENING_TIME, READ_BYTES};
-use crate::actors::gateway::registry::{
-    Connect, CountRefusal, Disconnect, Outlets, Refused, Registry,
-};
+use crate::actors::gateway::registry::{Connect, CountRefusal, Disconnect, Outlets, Registry};
+use crate::actors::resources::places::{HeldSlot, Refused};
 use crate::actors::resources::unread::Ends;
 use crate::protocol::messages::{self, Level};
+use crate::protocol::op::token::{AuthError, authenticate};
 #[cfg(feature = "web")]
 use crate::protocol::wire::frame::Foreign;
 use crate::protocol::wire::frame::{Opening, opening};
@@ -142,7 +140,7 @@ impl ClientSession {
                 return Detected::Refused(refused(&why.to_string(), id));
             }
         }
-        if frame.is_ok_and(|frame| is_command(&frame)) {
+        if frame.is_ok_and(|frame| frame.is_command()) {
             Detected::Command
         } else {
             Detected::Frames
@@ -233,7 +231,7 @@ impl ClientSession {
                     return match due {
                         None => foreign("the first bytes of this connection were never completed"),
                         Some(_) if self.admission.token.is_some() => {
-                            foreign(&AuthError::TooLate.to_string())
+                            foreign(&AuthError::TooLate(HEAD_TIME).to_string())
                         }
                         // It is refused like other clients without a place.
                         Some(_) => Detected::Frames,

@@ -16,7 +16,7 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
 use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, READ_BYTES, WRITE_BYTES, WRITE_FRAMES};
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::wire::frame::{FrameError, FramePart, FrameReader};
-use crate::protocol::wire::websocket::{MessageReader, MessageWriter, SocketEnd};
+use crate::protocol::wire::websocket::{SocketEnd, WebSocket};
 
 /// Why a client can no longer be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,7 +81,10 @@ impl<S: ClientStream> Transport<S> {
         let read = ready!(pin!(read_some(&mut self.stream, chunk)).poll(cx));
         Poll::Ready(match (read, &mut self.protocol) {
             (Err(_), _) => Err(ClientLost::Gone),
-            (Ok(0), Protocol::WebSocket(socket, _)) => Err(socket.lost(SocketEnd::Violated)),
+            (Ok(0), Protocol::WebSocket(socket, _)) => {
+                socket.outgoing.answer(SocketEnd::Violated);
+                Err(ClientLost::Refused)
+            }
             (Ok(bytes), _) => Ok(bytes),
         })
     }
@@ -100,7 +103,7 @@ impl<S: ClientStream> Transport<S> {
             Protocol::Plain(frames) => Ok(frames.cut()),
             Protocol::WebSocket(socket, _) => match socket.incoming.cut() {
                 Some(part) => Ok(Some(part)),
-                None => socket.check_end().map(|()| None),
+                None => check_end(socket).map(|()| None),
             },
         }
     }
@@ -114,7 +117,7 @@ impl<S: ClientStream> Transport<S> {
         socket.incoming.push(chunk);
         chunk.clear();
         socket.incoming.look_ahead(FRAMES_IN_A_ROW);
-        socket.check_end()
+        check_end(socket)
     }
 
     /// Bytes that [`look_ahead`](Self::look_ahead) has taken.
@@ -173,7 +176,7 @@ impl<S: ClientStream> Transport<S> {
         let stream = &mut self.stream;
         match &mut self.protocol {
             Protocol::Plain(_) => write_some(stream, cx, frames),
-            Protocol::WebSocket(socket, _) => socket.poll_write(stream, cx, frames),
+            Protocol::WebSocket(socket, _) => poll_messages(socket, stream, cx, frames),
         }
     }
 
@@ -181,7 +184,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         match &mut self.protocol {
             Protocol::Plain(_) => Poll::Ready(Ok(())),
-            Protocol::WebSocket(socket, _) => socket.poll_flush(&mut self.stream, cx),
+            Protocol::WebSocket(socket, _) => poll_output(socket, &mut self.stream, cx),
         }
     }
 
@@ -193,7 +196,7 @@ impl<S: ClientStream> Transport<S> {
         is_refused: bool,
     ) -> Poll<io::Result<()>> {
         if let Protocol::WebSocket(socket, _) = &mut self.protocol {
-            ready!(socket.poll_close(&mut self.stream, cx))?;
+            ready!(poll_close(socket, &mut self.stream, cx))?;
             if !is_refused {
                 return Poll::Ready(Ok(()));
             }
@@ -244,84 +247,55 @@ fn write_some<'a, S: AsyncWrite + Unpin, B: Deref<Target = [u8]> + 'a>(
 
 // ---- a WebSocket: a message is a frame ------------------------------------------------------------------------------
 
-/// The two directions of a WebSocket.
-#[derive(Default)]
-struct WebSocket {
-    incoming: MessageReader,
-    outgoing: MessageWriter,
+/// An error if the peer has ended the stream.
+fn check_end(socket: &mut WebSocket) -> Result<(), ClientLost> {
+    match socket.end() {
+        None => Ok(()),
+        Some(SocketEnd::Closed(_)) => Err(ClientLost::Gone),
+        Some(SocketEnd::Violated) => Err(ClientLost::Refused),
+    }
 }
 
-impl WebSocket {
-    fn check_end(&mut self) -> Result<(), ClientLost> {
-        self.incoming
-            .end()
-            .map_or(Ok(()), |end| Err(self.lost(end)))
+/// Sends a part of `frames`. Returns their number of bytes, once that part is sent. A peer that has closed gets only a
+/// close frame.
+fn poll_messages<'a, S: ClientStream>(
+    socket: &mut WebSocket,
+    stream: &mut S,
+    cx: &mut Context<'_>,
+    frames: impl Iterator<Item = &'a Bytes>,
+) -> Poll<io::Result<usize>> {
+    if let Some(SocketEnd::Closed(_)) = socket.incoming.end() {
+        ready!(poll_close(socket, stream, cx))?;
+        return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
     }
+    if !socket.outgoing.has_messages() {
+        ready!(poll_output(socket, stream, cx))?;
+        socket.outgoing.put(frames);
+    }
+    let sent = ready!(write_some(stream, cx, once(socket.outgoing.output())))?;
+    Poll::Ready(Ok(socket.outgoing.sent(sent)))
+}
 
-    /// Why the client is lost after this end, which the close frame answers.
-    const fn lost(&mut self, end: SocketEnd) -> ClientLost {
-        self.outgoing.answer(end);
-        match end {
-            SocketEnd::Closed(_) => ClientLost::Gone,
-            SocketEnd::Violated => ClientLost::Refused,
-        }
+/// Sends the output, and the answer to the latest ping.
+fn poll_output<S: ClientStream>(
+    socket: &mut WebSocket,
+    stream: &mut S,
+    cx: &mut Context<'_>,
+) -> Poll<io::Result<()>> {
+    while let Some(output) = socket.output() {
+        let sent = ready!(write_some(stream, cx, once(output)))?;
+        socket.outgoing.sent(sent);
     }
+    Poll::Ready(Ok(()))
+}
 
-    /// A peer that has closed gets only a close frame.
-    fn poll_write<'a, S: AsyncWrite + Unpin>(
-        &mut self,
-        stream: &mut S,
-        cx: &mut Context<'_>,
-        frames: impl Iterator<Item = &'a Bytes>,
-    ) -> Poll<io::Result<usize>> {
-        if let Some(SocketEnd::Closed(_)) = self.incoming.end() {
-            ready!(self.poll_close(stream, cx))?;
-            return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
-        }
-        if !self.outgoing.has_messages() {
-            ready!(self.poll_flush(stream, cx))?;
-            self.outgoing.put(frames);
-        }
-        self.poll_output(stream, cx)
-    }
-
-    /// Sends a part of the output. Returns the bytes of the writer's frames that are sent with it.
-    fn poll_output<S: AsyncWrite + Unpin>(
-        &mut self,
-        stream: &mut S,
-        cx: &mut Context<'_>,
-    ) -> Poll<io::Result<usize>> {
-        let sent = ready!(write_some(stream, cx, once(self.outgoing.output())))?;
-        Poll::Ready(Ok(self.outgoing.sent(sent)))
-    }
-
-    /// Sends the output, and the answer to the latest ping.
-    fn poll_flush<S: AsyncWrite + Unpin>(
-        &mut self,
-        stream: &mut S,
-        cx: &mut Context<'_>,
-    ) -> Poll<io::Result<()>> {
-        loop {
-            if self.outgoing.output().is_empty()
-                && let Some(ping) = self.incoming.take_ping()
-            {
-                self.outgoing.put_pong(&ping);
-            }
-            if self.outgoing.output().is_empty() {
-                return Poll::Ready(Ok(()));
-            }
-            ready!(self.poll_output(stream, cx))?;
-        }
-    }
-
-    /// Sends the close frame.
-    fn poll_close<S: AsyncWrite + Unpin>(
-        &mut self,
-        stream: &mut S,
-        cx: &mut Context<'_>,
-    ) -> Poll<io::Result<()>> {
-        ready!(self.poll_flush(stream, cx))?;
-        self.outgoing.put_close();
-        self.poll_flush(stream, cx)
-    }
+/// Sends the close frame.
+fn poll_close<S: ClientStream>(
+    socket: &mut WebSocket,
+    stream: &mut S,
+    cx: &mut Context<'_>,
+) -> Poll<io::Result<()>> {
+    ready!(poll_output(socket, stream, cx))?;
+    socket.outgoing.put_close();
+    poll_output(socket, stream, cx)
 }

@@ -12,14 +12,15 @@ use bytes::Bytes;
 use serde_json::json;
 use tokio::time::Instant;
 
-use super::forwarded::Forwarded;
-use super::refusal::Refusal;
-use super::{Client, FrameOrigin, Handled, RefuseCalls, Registry, Tapped};
-use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
+use super::{Client, FrameOrigin, Handled, Registry};
+use crate::actors::gateway::limits::DEFAULT_TIMEOUT;
+use crate::actors::graph::forwarded::Forwarded;
+use crate::actors::graph::refusal::{self, Refusal};
 use crate::actors::node::{
-    ActionClient, ActionRequest, Caller, CancelSent, Done, ForwardGoal, Route, ServiceCall, guard,
+    ActionClient, ActionRequest, Caller, CancelSent, Done, ForwardGoal, RefuseCalls, Route,
+    ServiceCall, Tapped, guard,
 };
-use crate::actors::resources::memory::cover_message;
+use crate::actors::resources::memory::{MAX_BACKLOG, cover_message};
 use crate::actors::resources::turns::{Timer, end_turn};
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
@@ -186,7 +187,7 @@ impl Registry {
     fn action_to_cancel<'a>(&self, service: &'a str) -> Option<&'a str> {
         let action = names::cancelled_action(service)?;
         let has = |kind, name| {
-            self.directory
+            self.providers
                 .provider(kind, &names::absolute(name))
                 .is_some()
         };
@@ -268,16 +269,7 @@ impl Registry {
         spelling: &str,
         type_name: Option<&str>,
     ) -> Result<(), Refusal> {
-        let is_own = match kind {
-            Served::Service => {
-                let action = names::cancelled_action(spelling).and_then(Action::from_name);
-                Service::from_name(spelling).is_some() || action.is_some()
-            }
-            Served::Action => Action::from_name(spelling).is_some(),
-        };
-        if is_own {
-            return Err(Refusal::OfRuntime(kind, spelling.to_owned()));
-        }
+        refusal::check_served(kind, spelling)?;
         let name = &*names::absolute(spelling);
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
@@ -287,7 +279,7 @@ impl Registry {
         let entry = client.entries.enter(bytes, served.get(&key))?;
         served.insert(key, entry);
         let provider = (origin.from, spelling);
-        let before = self.directory.provide(kind, name, provider, type_name);
+        let before = self.providers.provide(kind, name, provider, type_name);
         if let Some(before) = before.filter(|one| *one != origin.from)
             && let Some(before) = self.clients.get_mut(&before)
         {
@@ -306,7 +298,7 @@ impl Registry {
         spelling: &str,
     ) -> Result<(), Refusal> {
         let name = &*names::absolute(spelling);
-        if !self.directory.withdraw(kind, name, origin.from) {
+        if !self.providers.withdraw(kind, name, origin.from) {
             return Err(Refusal::NotServed(kind, spelling.to_owned()));
         }
         if let Some(client) = self.clients.get_mut(&origin.from) {
@@ -326,7 +318,7 @@ impl Registry {
         encode: impl FnOnce(&str, &str) -> Bytes,
     ) -> Result<(), Refusal> {
         let absolute = &*names::absolute(name);
-        let Some(provider) = self.directory.provider(kind, absolute) else {
+        let Some(provider) = self.providers.provider(kind, absolute) else {
             return Err(match kind {
                 Served::Service => NoService::NoProvider(name.to_owned()).into(),
                 Served::Action => Refusal::NoAction(name.to_owned()),
@@ -377,7 +369,7 @@ impl Registry {
         let goal = requests.goal_made_under(origin.id.as_ref(), action, origin.from);
         let Some((id, goal)) = goal else {
             let name = names::absolute(action);
-            return Err(match self.directory.provider(Served::Action, &name) {
+            return Err(match self.providers.provider(Served::Action, &name) {
                 Some(_) => Refusal::NoGoal(action.to_owned()),
                 None => Refusal::NoAction(action.to_owned()),
             });
@@ -395,7 +387,7 @@ impl Registry {
     /// a refusal and may call again.
     fn forward_all_cancellations(&mut self, action: &str) -> Result<(), Refusal> {
         let provider = self
-            .directory
+            .providers
             .provider(Served::Action, &names::absolute(action));
         let server = provider.and_then(|one| Some((one, self.clients.get(&one.connection)?)));
         let Some((provider, server)) = server else {
@@ -444,7 +436,8 @@ impl Registry {
         name: &str,
         encode: impl FnOnce(&str, Option<&Payload>) -> Bytes,
     ) -> Result<(), Refusal> {
-        let request = self.take_answered(origin, kind, None);
+        let (requests, id) = (&mut self.requests, origin.id.as_ref());
+        let request = requests.take_meant(kind, id, None, origin.from);
         let request = request.ok_or_else(|| match kind {
             Served::Service => Refusal::StaleCall(name.to_owned()),
             Served::Action => Refusal::StaleGoal(name.to_owned()),
@@ -472,21 +465,11 @@ impl Registry {
         problem: Problem,
     ) -> Result<(), Refusal> {
         let why = Refusal::Unreadable(problem);
-        match self.take_answered(origin, kind, name) {
+        let (requests, id) = (&mut self.requests, origin.id.as_ref());
+        match requests.take_meant(kind, id, name, origin.from) {
             Some(request) => self.discard(&request, why),
             None => Err(why),
         }
-    }
-
-    fn take_answered(
-        &mut self,
-        origin: &FrameOrigin,
-        kind: Served,
-        name: Option<&str>,
-    ) -> Option<Forwarded> {
-        let requests = &mut self.requests;
-        let number = requests.meant(kind, origin.id.as_ref(), name, origin.from)?;
-        requests.take(number)
     }
 
     /// Discards an answer. The caller and the provider get the reason.

@@ -15,26 +15,29 @@ use crate::protocol::op::Served;
 use crate::protocol::wire::json::Payload;
 
 /// A call or a goal.
-pub(super) struct Forwarded {
-    pub(super) caller: ConnectionId,
+pub struct Forwarded {
+    /// The client that sent it.
+    pub caller: ConnectionId,
     /// The caller's id of the request.
-    pub(super) id: Option<Payload>,
-    pub(super) provider: ConnectionId,
+    pub id: Option<Payload>,
+    /// The client that serves it.
+    pub provider: ConnectionId,
     /// The name of the service or action, as the caller spells it.
-    pub(super) name: Box<str>,
-    pub(super) kind: Served,
+    pub name: Box<str>,
+    /// Whether it is a call or a goal.
+    pub kind: Served,
     /// A call ends at its deadline. The registry may notice that later if the process was suspended. A goal has none.
-    pub(super) deadline: Option<Instant>,
+    pub deadline: Option<Instant>,
     /// The server's spelling of a goal's action. The goal can be cancelled under it.
-    pub(super) spelling: Option<Box<str>>,
+    pub spelling: Option<Box<str>>,
     /// Whether the sender of a goal gets feedback.
-    pub(super) wants_feedback: bool,
+    pub wants_feedback: bool,
     /// Whether a goal was cancelled with all others of its action. Its server is notified once.
-    pub(super) is_cancelled: bool,
+    pub is_cancelled: bool,
     /// A caller that has stopped sending is removed when its last call has ended.
-    pub(super) _done: Option<Done>,
-    /// Its part of the caller's limit [`MAX_REGISTERED`](crate::actors::gateway::limits::MAX_REGISTERED).
-    pub(super) _entry: Entry,
+    pub _done: Option<Done>,
+    /// Its part of the caller's limit [`MAX_REGISTERED`](super::registrations::MAX_REGISTERED).
+    pub _entry: Entry,
 }
 
 /// A key of the index. Deadlines sort first, so the first entry is the next deadline.
@@ -58,16 +61,16 @@ impl Forwarded {
 
 /// The requests, by their numbers.
 #[derive(Default)]
-pub(super) struct Requests {
+pub struct ForwardedRequests {
     outstanding: BTreeMap<u64, Forwarded>,
     /// The numbers under each key.
     index: BTreeSet<(RequestKey, u64)>,
     made: u64,
 }
 
-impl Requests {
+impl ForwardedRequests {
     /// Adds a request. Returns its id at its provider.
-    pub(super) fn add(&mut self, request: Forwarded) -> String {
+    pub fn add(&mut self, request: Forwarded) -> String {
         self.made += 1;
         let number = self.made;
         self.index.extend(request.keys().map(|key| (key, number)));
@@ -92,7 +95,7 @@ impl Requests {
 
     /// The number of the request with this `id`, if `provider` serves it. Without an id, it is the only request that
     /// waits for `provider`, if its name is `name`.
-    pub(super) fn meant(
+    pub fn meant(
         &self,
         kind: Served,
         id: Option<&Payload>,
@@ -115,8 +118,20 @@ impl Requests {
         (is_theirs && is_meant && !is_late).then_some(number)
     }
 
+    /// Removes and returns the request that [`meant`](Self::meant) finds.
+    pub fn take_meant(
+        &mut self,
+        kind: Served,
+        id: Option<&Payload>,
+        name: Option<&str>,
+        provider: ConnectionId,
+    ) -> Option<Forwarded> {
+        let number = self.meant(kind, id, name, provider)?;
+        self.take(number)
+    }
+
     /// The newest goal of `caller` with this `id`, and its id at the provider.
-    pub(super) fn goal_made_under(
+    pub fn goal_made_under(
         &self,
         id: Option<&Payload>,
         name: &str,
@@ -132,7 +147,7 @@ impl Requests {
 
     /// Marks the goals of an action at `provider` as cancelled, oldest first and at most `limit`. Returns their ids there,
     /// and whether any remain. A goal is returned only once.
-    pub(super) fn cancel_all(
+    pub fn cancel_all(
         &mut self,
         action: &str,
         provider: ConnectionId,
@@ -152,12 +167,13 @@ impl Requests {
         (next.into_iter().map(own_id).collect(), is_rest)
     }
 
-    pub(super) fn get(&self, number: u64) -> Option<&Forwarded> {
+    /// The request with this number.
+    pub fn get(&self, number: u64) -> Option<&Forwarded> {
         self.outstanding.get(&number)
     }
 
     /// Removes and returns a request.
-    pub(super) fn take(&mut self, number: u64) -> Option<Forwarded> {
+    pub fn take(&mut self, number: u64) -> Option<Forwarded> {
         let request = self.outstanding.remove(&number)?;
         for key in request.keys() {
             self.index.remove(&(key, number));
@@ -166,14 +182,14 @@ impl Requests {
     }
 
     /// Removes and returns every request, oldest first.
-    pub(super) fn take_all(&mut self) -> Vec<Forwarded> {
+    pub fn take_all(&mut self) -> Vec<Forwarded> {
         let numbers: Vec<u64> = self.outstanding.keys().copied().collect();
         let requests = numbers.into_iter().map(|number| self.take(number));
         requests.flatten().collect()
     }
 
     /// The earliest deadline.
-    pub(super) fn next_deadline(&self) -> Option<Instant> {
+    pub fn next_deadline(&self) -> Option<Instant> {
         match self.index.first()? {
             (RequestKey::Deadline(deadline), _) => Some(*deadline),
             _ => None,
@@ -181,21 +197,21 @@ impl Requests {
     }
 
     /// Removes and returns the request with the earliest deadline, if that has passed.
-    pub(super) fn take_due(&mut self, now: Instant) -> Option<Forwarded> {
+    pub fn take_due(&mut self, now: Instant) -> Option<Forwarded> {
         self.next_deadline().filter(|due| *due <= now)?;
         let (_, number) = *self.index.first()?;
         self.take(number)
     }
 
     /// The oldest request that waits for `provider`.
-    pub(super) fn waiting_for(&self, provider: ConnectionId) -> Option<u64> {
+    pub fn waiting_for(&self, provider: ConnectionId) -> Option<u64> {
         let of = |kind| RequestKey::Provider(provider, kind);
         let mut waiting = self.numbers_between(of(Served::Service), of(Served::Action));
         waiting.next()
     }
 
     /// Removes the requests of `caller`.
-    pub(super) fn forget_caller(&mut self, caller: ConnectionId) {
+    pub fn forget_caller(&mut self, caller: ConnectionId) {
         let of = |kind| RequestKey::Caller(caller, kind);
         let made = self.numbers_between(of(Served::Service), of(Served::Action));
         for number in made.collect::<Vec<u64>>() {

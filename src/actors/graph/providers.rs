@@ -1,7 +1,7 @@
 //! The names that clients serve to others: services and actions. They and the topics are sorted, so that listing them
 //! needs no search.
 //!
-//! **Invariant:** the directory has a name exactly as long as a client has registered it.
+//! **Invariant:** the table has a name exactly as long as a client has registered it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,19 +12,20 @@ use crate::protocol::ros::rosapi::{Census, Listed, MAX_LISTED};
 
 /// The services and the actions by their absolute names, each with its provider.
 #[derive(Default)]
-pub(super) struct Directory(BTreeMap<Served, BTreeMap<Arc<str>, Provider>>);
+pub struct Providers(BTreeMap<Served, BTreeMap<Arc<str>, Provider>>);
 
 /// The client that serves a service or an action.
-pub(super) struct Provider {
-    pub(super) connection: ConnectionId,
+pub struct Provider {
+    /// The client.
+    pub connection: ConnectionId,
     /// The provider's spelling of the name. Requests to it have this spelling.
-    pub(super) spelling: Box<str>,
+    pub spelling: Box<str>,
     type_name: Option<Arc<str>>,
 }
 
-impl Directory {
+impl Providers {
     /// Makes a client the provider of `name`. The newest registration wins. Returns the previous provider.
-    pub(super) fn provide(
+    pub fn provide(
         &mut self,
         kind: Served,
         name: &str,
@@ -41,12 +42,13 @@ impl Directory {
         Some(before.connection)
     }
 
-    pub(super) fn provider(&self, kind: Served, name: &str) -> Option<&Provider> {
+    /// The client that serves `name`.
+    pub fn provider(&self, kind: Served, name: &str) -> Option<&Provider> {
         self.0.get(&kind)?.get(name)
     }
 
     /// Withdraws a name if `connection` is its provider. Returns whether it was.
-    pub(super) fn withdraw(&mut self, kind: Served, name: &str, connection: ConnectionId) -> bool {
+    pub fn withdraw(&mut self, kind: Served, name: &str, connection: ConnectionId) -> bool {
         let is_ours = |one: &Provider| one.connection == connection;
         let is_served = self.provider(kind, name).is_some_and(is_ours);
         if is_served && let Some(served) = self.0.get_mut(&kind) {
@@ -56,7 +58,7 @@ impl Directory {
     }
 
     /// Lists the topics, services and actions, up to the limit of each list.
-    pub(super) fn census(&self, topics: impl Iterator<Item = Listed>) -> Census {
+    pub fn census(&self, topics: impl Iterator<Item = Listed>) -> Census {
         let listed = |kind| {
             let all = self.0.get(&kind).into_iter().flatten().take(MAX_LISTED);
             let all = all.map(|(name, one)| Listed {
@@ -81,11 +83,11 @@ mod tests {
 
     #[test]
     fn a_bounded_number_of_topics_and_services_is_listed() {
-        let mut directory = Directory::default();
+        let mut providers = Providers::default();
         let name = |n: usize| format!("/{n:05}");
         for n in 0..=MAX_LISTED {
             let provider = (ConnectionId(1), &*name(n));
-            directory.provide(Served::Service, &name(n), provider, None);
+            providers.provide(Served::Service, &name(n), provider, None);
         }
         let topics = (0..=MAX_LISTED).map(|n| Listed {
             name: name(n).into(),
@@ -93,7 +95,7 @@ mod tests {
             published: true,
             subscribed: false,
         });
-        let census = directory.census(topics);
+        let census = providers.census(topics);
         let listed = (census.topics.len(), census.services.len());
         assert_eq!(listed, (MAX_LISTED, MAX_LISTED));
         let last = (

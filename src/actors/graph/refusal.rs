@@ -1,21 +1,21 @@
-//! The reasons for which the registry refuses an op or a call, as clients read them.
+//! The reasons for which an op or a call is refused, as clients read them.
 //!
 //! **Invariant:** every sentence begins with its field, or names the service.
 
-use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_BACKLOG, MAX_REGISTERED};
+use super::registrations::TooMuchRegistered;
+use crate::actors::resources::memory::MAX_BACKLOG;
+use crate::protocol::catalog::{Action, Service, Topic};
+use crate::protocol::names;
 use crate::protocol::op::{Problem, Served};
 use crate::services::NoService;
 
 /// An op or a call that changed nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub(super) enum Refusal {
+pub(in crate::actors) enum Refusal {
     #[error("topic: {0} belongs to the runtime; a client can't advertise it or publish there")]
     RuntimeTopic(String),
-    #[error(
-        "this connection keeps too much: its subscriptions, advertisements, services, and waiting calls and goals may \
-         take {MAX_REGISTERED} bytes. Each takes {ENTRY_BYTES} bytes and three times its names and ids"
-    )]
-    TooMuchRegistered,
+    #[error(transparent)]
+    TooMuchRegistered(#[from] TooMuchRegistered),
     #[error(
         "compression: cbor-raw needs a message type that this runtime knows; give it as type, or subscribe with cbor"
     )]
@@ -60,4 +60,27 @@ pub(super) enum Refusal {
     ActionType(&'static str),
     #[error("{0}")]
     Closed(&'static str),
+}
+
+/// Refuses to publish on topics that only the runtime may publish.
+pub(in crate::actors) fn check_published(topic: &str) -> Result<(), Refusal> {
+    match Topic::from_name(topic) {
+        Some(own) if !own.is_subscribed() => Err(Refusal::RuntimeTopic(topic.to_owned())),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses to serve the services and actions of the runtime.
+pub(in crate::actors) fn check_served(kind: Served, name: &str) -> Result<(), Refusal> {
+    let is_own = match kind {
+        Served::Service => {
+            let action = names::cancelled_action(name).and_then(Action::from_name);
+            Service::from_name(name).is_some() || action.is_some()
+        }
+        Served::Action => Action::from_name(name).is_some(),
+    };
+    if is_own {
+        return Err(Refusal::OfRuntime(kind, name.to_owned()));
+    }
+    Ok(())
 }

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bytes::Bytes;
 use serde_json::value::RawValue;
 
-use super::Subscriber;
+use super::topics::Subscriber;
 use crate::actors::resources::long_work::SHORT_WORK;
 use crate::actors::resources::memory::{Permit, cover_message};
 use crate::protocol::messages;
@@ -21,43 +21,45 @@ use crate::protocol::wire::{fragments, series};
 
 /// The messages in one form.
 #[derive(Default)]
-pub(super) struct Made {
-    pub(super) messages: Vec<Bytes>,
+pub struct Made {
+    /// The encoded messages.
+    pub messages: Vec<Bytes>,
     /// Number of messages that could not be made: too long for every outbox, or not of their type.
-    pub(super) lost: u64,
+    pub lost: u64,
 }
 
 /// A message, or a series of messages, to encode in another form.
-pub(super) struct ToEncode {
+pub struct ToEncode {
     /// The topic, as the subscribers spell it.
-    pub(super) spelling: Arc<str>,
-    pub(super) plain: Bytes,
+    pub spelling: Arc<str>,
+    /// The JSON frames.
+    pub plain: Bytes,
     /// The form.
-    pub(super) encoding: Encoding,
+    pub encoding: Encoding,
     /// The `spelling` of each subscriber that requested this form when the message was published. It is the
     /// subscriber's own allocation, so one that unsubscribes and subscribes again is another.
-    pub(super) recipients: Vec<Arc<str>>,
+    pub recipients: Vec<Arc<str>>,
     /// The type of the topic's messages, if it is known.
-    pub(super) type_name: Option<&'static str>,
+    pub type_name: Option<&'static str>,
     /// Number of messages sent in fragments. It is part of the fragments' ids.
-    pub(super) fragmented: Arc<AtomicU64>,
+    pub fragmented: Arc<AtomicU64>,
     /// The memory permit of a long message. All its forms share it.
-    pub(super) permit: Option<Permit>,
+    pub permit: Option<Permit>,
 }
 
 impl ToEncode {
     /// Whether the subscriber requested this form.
-    pub(super) fn suits(&self, subscriber: &Subscriber) -> bool {
+    pub fn suits<M>(&self, subscriber: &Subscriber<M>) -> bool {
         (&*self.spelling, self.encoding) == (&*subscriber.spelling, subscriber.encoding)
     }
 
     /// Whether it is so long that a worker thread must encode it.
-    pub(super) fn is_long(&self) -> bool {
+    pub fn is_long(&self) -> bool {
         self.plain.len() > SHORT_WORK
     }
 
     /// Makes the form.
-    pub(super) fn make(&self) -> Made {
+    pub fn make(&self) -> Made {
         let mut made = Made::default();
         for message in series::messages(self.plain.clone()) {
             match self.encode(&message) {

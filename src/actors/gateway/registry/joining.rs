@@ -1,0 +1,99 @@
+//! Clients join and leave.
+//!
+//! **Invariant:** a client has one entry from [`Connect`] to [`Disconnect`]. Its registrations end when it stops sending.
+
+use std::net::IpAddr;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use actix::prelude::*;
+use tokio::time::Instant;
+
+use super::{Client, Handled, Outlets, Registry};
+use crate::actors::ConnectionId;
+use crate::actors::node::ClientLink;
+use crate::actors::resources::places::Refused;
+
+/// A new client. From its connection. Returns its id.
+#[derive(Message)]
+#[rtype(result = "Result<ConnectionId, Refused>")]
+pub struct Connect {
+    /// The handles to its connection.
+    pub outlets: Outlets,
+    /// Its address.
+    pub from: IpAddr,
+    /// Whether it may use a kept place.
+    pub may_use_kept: bool,
+}
+
+/// A client was refused because no place was free. From its connection.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct CountRefusal;
+
+/// The client has stopped sending. The registry withdraws its registrations. From its connection. The effect of
+/// [`Handled`] ends when the client's calls have been answered.
+#[derive(Message)]
+#[rtype(result = "Handled")]
+pub struct Retire(pub ConnectionId);
+
+/// The client has disconnected, and its output is gone. The registry frees its place. From its connection. Idempotent.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Disconnect(pub ConnectionId);
+
+impl Handler<Connect> for Registry {
+    type Result = Result<ConnectionId, Refused>;
+
+    fn handle(&mut self, connect: Connect, ctx: &mut Context<Self>) -> Self::Result {
+        if self.closed.is_some() {
+            return Err(Refused::Closed);
+        }
+        let taken = self.clients.len();
+        self.places.take(taken, connect.may_use_kept)?;
+        self.connections_made += 1;
+        let id = ConnectionId(self.connections_made);
+        let link = ClientLink {
+            registry: ctx.address().recipient(),
+            connection: id,
+            gone: Arc::clone(&connect.outlets.gone),
+        };
+        let client = Client::new(connect.outlets, connect.from, link);
+        self.clients.insert(id, client);
+        self.gauges.set_connections(self.clients.len() as u64);
+        Ok(id)
+    }
+}
+
+impl Handler<CountRefusal> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, _: CountRefusal, _: &mut Context<Self>) {
+        let all = self.clients.values().map(|client| client.from);
+        self.places.warn_of_refusal(all, Instant::now());
+    }
+}
+
+impl Handler<Retire> for Registry {
+    type Result = Handled;
+
+    fn handle(&mut self, Retire(id): Retire, _: &mut Context<Self>) -> Handled {
+        self.withdraw(id);
+        let client = self.clients.get_mut(&id);
+        let calls = client.and_then(|client| client.calls.take());
+        calls.map_or_else(Handled::at_once, |(_, all_ended)| Handled::with(all_ended))
+    }
+}
+
+impl Handler<Disconnect> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, Disconnect(id): Disconnect, _: &mut Context<Self>) {
+        self.withdraw(id);
+        self.requests.forget_caller(id);
+        if let Some(client) = self.clients.remove(&id) {
+            client.link.gone.store(true, Ordering::Relaxed);
+            self.gauges.set_connections(self.clients.len() as u64);
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! Published messages: to the subscribers of their topic, and to the node that subscribes to it. A message is encoded
+//! once for each spelling of its topic and each requested encoding.
+//!
+//! **Invariant:** without subscribers nothing is encoded. Subscribers that requested the same encoding share the same
+//! bytes. A long message delays only its publisher.
+
+use std::sync::Arc;
+
+use actix::prelude::*;
+use bytes::Bytes;
+
+use super::subscriptions::discard_held;
+use super::{FrameOrigin, Handled, Registry, Subscriber, ToClient};
+use crate::actors::ConnectionId;
+use crate::actors::gateway::limits::MAX_LONG_FORMS;
+use crate::actors::graph::forms::{Made, ToEncode};
+use crate::actors::graph::refusal;
+use crate::actors::node::{Done, Publish, SetTap, Tapped, TopicMessage, guard};
+use crate::actors::resources::long_work::{WorkKind, run_long_work};
+use crate::actors::resources::memory::cover_message;
+use crate::protocol::catalog::Topic;
+use crate::protocol::limits::MEDIUM;
+use crate::protocol::messages;
+use crate::protocol::names;
+use crate::protocol::wire::json::Payload;
+use crate::protocol::wire::series::Series;
+
+impl Registry {
+    /// Delivers a client's message to the topic's subscribers, and to the runtime's own subscriber if there is one.
+    pub(super) fn publish(
+        &mut self,
+        origin: FrameOrigin,
+        topic: &str,
+        msg: Payload,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        if let Err(why) = refusal::check_published(topic) {
+            self.refuse(&origin, &why);
+            return Handled::at_once();
+        }
+        let topic = &*names::absolute(topic);
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Handled::at_once();
+        };
+        let node = Topic::from_name(topic)
+            .filter(|topic| topic.is_subscribed() && !client.withdrawn.contains(topic))
+            .and_then(|topic| Some((topic, self.nodes.subscribers.get(&topic)?)));
+        if node.is_none() && !client.registered.advertised.contains_key(topic) {
+            return Handled::at_once();
+        }
+        let encode = |spelling: &str| messages::publish_raw(spelling, &msg);
+        let long = self.fan_out(topic, encode);
+        let Some((topic, node)) = node else {
+            return self.finish_delivery(long, ctx);
+        };
+        let (done, ended) = guard();
+        self.encode_aside(long, &done, ctx);
+        if let Some(tap) = &mut self.tap {
+            let frame = messages::publish_raw(topic.name(), &msg);
+            tap(Tapped::Published(topic, &frame));
+        }
+        node(TopicMessage {
+            msg,
+            link: client.link.clone(),
+            listening: Arc::downgrade(&client.listening),
+            id: origin.id,
+            done,
+        });
+        Handled::with(ended)
+    }
+
+    /// Delivers messages of a client unchanged, if it advertises the topic.
+    pub(super) fn publish_lines(
+        &self,
+        from: ConnectionId,
+        lines: &Series,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        let topic = &*lines.topic;
+        let client = self.clients.get(&from);
+        if client.is_none_or(|client| !client.registered.advertised.contains_key(topic)) {
+            return Handled::at_once();
+        }
+        let encode = |spelling: &str| messages::respelled(topic, spelling, &lines.frames);
+        self.finish_delivery(self.fan_out(topic, encode), ctx)
+    }
+
+    /// Delivers a message, or a series of messages, to every subscriber of `topic`, an absolute name, in all spellings.
+    /// `encode` makes the JSON for a spelling. Returns the long messages that are still to be encoded in other forms.
+    fn fan_out(&self, topic: &str, encode: impl Fn(&str) -> Bytes) -> Vec<ToEncode> {
+        let mut plain: Vec<(&str, Bytes)> = Vec::new();
+        let mut others: Vec<ToEncode> = Vec::new();
+        for subscriber in self.topics.subscribers(topic) {
+            let (spelling, encoding) = (&*subscriber.spelling, subscriber.encoding);
+            let known = plain.iter().find(|(known, _)| *known == spelling);
+            let frame = match known {
+                Some((_, frame)) => frame.clone(),
+                None => {
+                    let frame = cover_message(self.permit.as_ref(), encode(spelling));
+                    plain.push((spelling, frame.clone()));
+                    frame
+                }
+            };
+            let mut forms = others.iter_mut();
+            if encoding.keeps(frame.len()) {
+                deliver(subscriber, frame);
+            } else if let Some(known) = forms.find(|form| form.suits(subscriber)) {
+                known.recipients.push(Arc::clone(&subscriber.spelling));
+            } else if frame.len() > MEDIUM && plain.len() + others.len() >= MAX_LONG_FORMS {
+                self.gauges.add_dropped(1);
+            } else {
+                others.push(self.to_encode(subscriber, frame));
+            }
+        }
+        let (long, short) = others.into_iter().partition(ToEncode::is_long);
+        for message in short {
+            self.deliver_made(&message, &message.make());
+        }
+        long
+    }
+
+    /// Ends the delivery of a client's message. The client waits for the encoding of a long one.
+    fn finish_delivery(&self, long: Vec<ToEncode>, ctx: &mut Context<Self>) -> Handled {
+        if long.is_empty() {
+            return Handled::at_once();
+        }
+        let (done, ended) = guard();
+        self.encode_aside(long, &done, ctx);
+        Handled::with(ended)
+    }
+
+    /// Encodes long messages on worker threads, and delivers them.
+    fn encode_aside(&self, long: Vec<ToEncode>, done: &Done, ctx: &mut Context<Self>) {
+        for message in long {
+            let done = Done::clone(done);
+            let kind = WorkKind::of(message.plain.len());
+            let count = message.recipients.len() as u64;
+            let making = run_long_work(kind, move || (message.make(), message));
+            ctx.spawn(making.into_actor(self).map(move |made, registry, _| {
+                match made {
+                    Some((made, message)) => registry.deliver_made(&message, &made),
+                    None => registry.gauges.add_dropped(count),
+                }
+                drop(done);
+            }));
+        }
+    }
+
+    /// Delivers a message in one form to its recipients that are still subscribed, even if they have requested another
+    /// form since.
+    fn deliver_made(&self, message: &ToEncode, made: &Made) {
+        let topic = names::absolute(&message.spelling);
+        // Both lists have the same order.
+        let mut left = self.topics.subscribers(&topic).iter();
+        for recipient in &message.recipients {
+            let mut rest = left.clone();
+            if let Some(subscriber) = rest.find(|one| Arc::ptr_eq(recipient, &one.spelling)) {
+                self.deliver_form(subscriber, made);
+                left = rest;
+            }
+        }
+    }
+
+    /// Delivers the messages of a form. Messages that could not be made count as dropped.
+    fn deliver_form(&self, subscriber: &Subscriber, made: &Made) {
+        self.gauges.add_dropped(made.lost);
+        for frame in &made.messages {
+            deliver(subscriber, frame.clone());
+        }
+    }
+
+    /// Delivers a latched topic's last message to a new subscription.
+    pub(super) fn deliver_latched(&self, spelling: &str, to: ConnectionId) {
+        let latched = Topic::from_name(spelling).map(|topic| (topic, self.latched.get(&topic)));
+        let Some((topic, Some(frame))) = latched else {
+            return;
+        };
+        let mut all = self.topics.subscribers(topic.name()).iter();
+        if let Some(subscriber) = all.find(|one| one.connection == to && *one.spelling == *spelling)
+        {
+            let plain = messages::respelled(topic.name(), spelling, frame);
+            if subscriber.encoding.keeps(plain.len()) {
+                return deliver(subscriber, plain);
+            }
+            let message = self.to_encode(subscriber, plain);
+            self.deliver_form(subscriber, &message.make());
+        }
+    }
+
+    /// A JSON frame, or a series of frames, to encode in the form that the subscriber requested.
+    fn to_encode(&self, subscriber: &Subscriber, plain: Bytes) -> ToEncode {
+        ToEncode {
+            spelling: Arc::clone(&subscriber.spelling),
+            plain,
+            encoding: subscriber.encoding,
+            recipients: vec![Arc::clone(&subscriber.spelling)],
+            type_name: self.topics.known_type(&subscriber.spelling),
+            fragmented: Arc::clone(&self.fragmented),
+            permit: self.permit.clone(),
+        }
+    }
+}
+
+impl Handler<Publish> for Registry {
+    type Result = ();
+
+    /// Delivers a message of a node. Stores it if its topic is latched. Messages that it outdates are discarded even
+    /// if nobody subscribes to it, because an answer may follow.
+    fn handle(&mut self, Publish { topic, frame }: Publish, _: &mut Context<Self>) {
+        let name = topic.name();
+        for subscriber in topic
+            .supersedes()
+            .iter()
+            .flat_map(|one| self.topics.subscribers(one))
+        {
+            discard_held(subscriber);
+        }
+        if !self.is_wanted(name) {
+            return;
+        }
+        let frame = frame();
+        if let Some(tap) = &mut self.tap {
+            tap(Tapped::Published(topic, &frame));
+        }
+        let encode = |spelling: &str| messages::respelled(name, spelling, &frame);
+        // A node cannot wait, and its messages are short.
+        for message in self.fan_out(name, encode) {
+            self.deliver_made(&message, &message.make());
+        }
+        if topic.is_latched() {
+            self.latched.insert(topic, frame);
+        }
+    }
+}
+
+impl Handler<SetTap> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, SetTap(tap): SetTap, _: &mut Context<Self>) {
+        let was_set = self.tap.is_some();
+        self.tap = tap;
+        for topic in Topic::ALL {
+            if self.topics.subscribers(topic.name()).is_empty() {
+                match (was_set, self.tap.is_some()) {
+                    (_, true) => self.notify_owner(topic.name(), true),
+                    (true, false) => self.note_unwanted(topic.name()),
+                    (false, false) => {}
+                }
+            } else if let (Some(frame), Some(tap)) = (self.latched.get(&topic), &mut self.tap) {
+                tap(Tapped::Published(topic, frame));
+            }
+        }
+    }
+}
+
+fn deliver(subscriber: &Subscriber, frame: Bytes) {
+    let topic = Some(Arc::clone(&subscriber.spelling));
+    subscriber
+        .mailbox
+        .do_send(ToClient::Deliver { topic, frame });
+}
