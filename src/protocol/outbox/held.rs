@@ -102,6 +102,9 @@ impl Outbox {
 
     /// The topic with the earliest due message, and its time. A client has at most about 200 topics.
     fn next_due(&self) -> Option<(Instant, &Arc<str>)> {
+        if !self.holds_back() {
+            return None;
+        }
         let limits = self.limits.iter();
         let due = limits.filter_map(|(topic, limits)| Some((limits.due()?, topic)));
         due.min()
@@ -109,9 +112,6 @@ impl Outbox {
 
     /// Queues the held messages that are due. The client requested this delay, so their age counts from now.
     pub(super) fn release(&mut self, now: Instant) {
-        if !self.holds_back() {
-            return;
-        }
         while let Some((_, topic)) = self.next_due().filter(|(due, _)| *due <= now) {
             let topic = Arc::clone(topic);
             let Some(limits) = self.limits.get_mut(&topic) else {

@@ -29,7 +29,7 @@ impl QueuedMessage {
     }
 
     pub(super) fn is_older(&self, age: Duration, now: Instant) -> bool {
-        now.saturating_duration_since(self.since) > age
+        self.since.checked_add(age).is_some_and(|end| end < now)
     }
 
     /// The number of messages.

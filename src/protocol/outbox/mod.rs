@@ -169,11 +169,13 @@ impl Outbox {
             if let Some(room) = self.room.as_mut().filter(|_| !is_response) {
                 *room = room.saturating_sub(length);
             }
-            self.writing.extend(frame.map(|rest| Writing {
-                rest,
-                is_response,
-                length,
-            }));
+            if let Some(rest) = frame {
+                self.writing.push_back(Writing {
+                    rest,
+                    is_response,
+                    length,
+                });
+            }
         }
         self.is_behind &= self.has_topics();
         self.check_sums();
@@ -271,7 +273,7 @@ impl Outbox {
     /// Queues a message or a series. An old message of its topic is dropped.
     fn enqueue(&mut self, topic: Option<&Arc<str>>, since: Instant, frame: Bytes) {
         self.produced += 1;
-        let replaced = topic.and_then(|topic| {
+        let replaced = topic.filter(|_| self.kept_old > 0).and_then(|topic| {
             let mut old = self.topics.range(..self.kept_old);
             old.position(|message| message.is_on(topic))
         });
@@ -308,7 +310,10 @@ impl Outbox {
     }
 
     fn take_out(&mut self, index: usize) -> Option<QueuedMessage> {
-        let message = self.topics.remove(index)?;
+        let message = match index {
+            0 => self.topics.pop_front(),
+            _ => self.topics.remove(index),
+        }?;
         self.waiting.forget(&message);
         if index < self.kept_old {
             self.kept_old -= 1;
