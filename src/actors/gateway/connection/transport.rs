@@ -171,7 +171,7 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn poll_write<'a>(
         &mut self,
         cx: &mut Context<'_>,
-        frames: impl Iterator<Item = &'a Bytes>,
+        frames: impl ExactSizeIterator<Item = &'a Bytes>,
     ) -> Poll<io::Result<usize>> {
         let stream = &mut self.stream;
         match &mut self.protocol {
@@ -220,24 +220,28 @@ pub(super) async fn read_some<S: AsyncRead + Unpin>(
 fn write_some<'a, S: AsyncWrite + Unpin, B: Deref<Target = [u8]> + 'a>(
     stream: &mut S,
     cx: &mut Context<'_>,
-    frames: impl Iterator<Item = &'a B>,
+    mut frames: impl ExactSizeIterator<Item = &'a B>,
 ) -> Poll<io::Result<usize>> {
-    let mut slices = [IoSlice::new(&[]); WRITE_FRAMES];
-    let mut room = WRITE_BYTES;
-    let mut count = 0;
-    for (slice, frame) in slices.iter_mut().zip(frames) {
-        let offered = frame.len().min(room);
-        *slice = IoSlice::new(frame.get(..offered).unwrap_or_default());
-        count += 1;
-        room -= offered;
-        if room == 0 {
-            break;
-        }
-    }
     let stream = Pin::new(stream);
-    let written = match slices.get(..count).unwrap_or_default() {
-        [slice] => ready!(stream.poll_write(cx, slice))?,
-        slices => ready!(stream.poll_write_vectored(cx, slices))?,
+    let written = if frames.len() == 1 {
+        let frame = frames.next().map_or(&[][..], |frame| frame);
+        let offered = frame.get(..WRITE_BYTES).unwrap_or(frame);
+        ready!(stream.poll_write(cx, offered))?
+    } else {
+        let mut slices = [IoSlice::new(&[]); WRITE_FRAMES];
+        let mut room = WRITE_BYTES;
+        let mut count = 0;
+        for (slice, frame) in slices.iter_mut().zip(frames) {
+            let offered = frame.len().min(room);
+            *slice = IoSlice::new(frame.get(..offered).unwrap_or_default());
+            count += 1;
+            room -= offered;
+            if room == 0 {
+                break;
+            }
+        }
+        let slices = slices.get(..count).unwrap_or_default();
+        ready!(stream.poll_write_vectored(cx, slices))?
     };
     Poll::Ready(match written {
         0 => Err(io::ErrorKind::WriteZero.into()),
@@ -262,7 +266,7 @@ fn poll_messages<'a, S: ClientStream>(
     socket: &mut WebSocket,
     stream: &mut S,
     cx: &mut Context<'_>,
-    frames: impl Iterator<Item = &'a Bytes>,
+    frames: impl ExactSizeIterator<Item = &'a Bytes>,
 ) -> Poll<io::Result<usize>> {
     if let Some(SocketEnd::Closed(_)) = socket.incoming.end() {
         ready!(poll_close(socket, stream, cx))?;
