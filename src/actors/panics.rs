@@ -46,9 +46,12 @@ pub fn end_with(end: impl Fn(&str) + Send + Sync + 'static) {
 /// # Errors
 /// The panic.
 pub fn contain<T>(work: impl FnOnce() -> T) -> Result<T, Contained> {
-    CONTAINED.set(CONTAINED.get() + 1);
-    let outcome = catch_unwind(AssertUnwindSafe(work));
-    CONTAINED.set(CONTAINED.get() - 1);
+    let outcome = CONTAINED.with(|active| {
+        active.set(active.get() + 1);
+        let outcome = catch_unwind(AssertUnwindSafe(work));
+        active.set(active.get() - 1);
+        outcome
+    });
     outcome.map_err(|_| Contained(LAST.with_borrow_mut(std::mem::take)))
 }
 
