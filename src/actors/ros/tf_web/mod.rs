@@ -11,16 +11,13 @@
 
 mod wire;
 
-use std::collections::VecDeque;
 use std::sync::Weak;
 use std::time::Duration;
 
 use actix::prelude::*;
-use serde::Serialize;
 use serde_json::{Value, json};
 use tokio::time::Instant;
 
-use crate::actors::ConnectionId;
 use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{
     ActionClient, Ask, Call, CancelSent, ForwardGoal, Interest, Publish, ShutDown,
@@ -57,7 +54,7 @@ impl Ask for RepublishTfs {
     type Answer = ();
 }
 
-/// The requested frames of an arm of `N` links.
+/// A client's request for frames of an arm of `N` links.
 pub struct FrameGoal<const N: usize> {
     /// The frames.
     pub sources: Vec<String>,
@@ -65,37 +62,22 @@ pub struct FrameGoal<const N: usize> {
     pub target: String,
     /// Time between two messages.
     pub period: Duration,
+    /// `None` for a goal of the action.
+    pub published: Option<PublishedGoal>,
 }
 
-/// Sends frames until cancelled. From clients, by the topic.
+/// A goal that a client has published.
+pub struct PublishedGoal {
+    /// Its id, which its feedback has too.
+    pub id: String,
+    /// Ends when the client no longer listens to the feedback.
+    pub listening: Weak<()>,
+}
+
+/// Ends the published goals with that id, or all of them. From clients, by the topic.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub struct SubscribeFrames<const N: usize> {
-    /// The frames.
-    pub goal: FrameGoal<N>,
-    /// The receiver of the frames.
-    pub by: FrameReceiver,
-}
-
-/// A receiver of frames.
-pub enum FrameReceiver {
-    /// A client with a goal of the action.
-    Client(Box<ActionClient>),
-    /// A client with a published goal.
-    Topic {
-        /// The goal's id.
-        id: String,
-        /// The client.
-        connection: ConnectionId,
-        /// Ends when the client no longer listens.
-        listening: Weak<()>,
-    },
-}
-
-/// Cancels the published goal with that id, or all of them. From clients, by the topic.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct UnsubscribeFrames(pub Option<String>);
+pub struct CancelPublished(pub Option<String>);
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -104,10 +86,17 @@ pub struct TfRepublisher<const N: usize> {
     arm: Recipient<ArmPose<N>>,
     publish: Recipient<Publish>,
     /// Oldest first.
-    subscriptions: VecDeque<(SubscribeFrames<N>, Instant)>,
+    requests: Vec<FrameRequest<N>>,
     /// When the topic is due next, while it has subscribers.
     topic: Option<Instant>,
     timer: Option<SpawnHandle>,
+}
+
+struct FrameRequest<const N: usize> {
+    goal: FrameGoal<N>,
+    client: ActionClient,
+    /// When its next message is due.
+    due: Instant,
 }
 
 impl<const N: usize> TfRepublisher<N> {
@@ -117,7 +106,7 @@ impl<const N: usize> TfRepublisher<N> {
         Self {
             arm,
             publish,
-            subscriptions: VecDeque::new(),
+            requests: Vec::new(),
             topic: None,
             timer: None,
         }
@@ -140,69 +129,51 @@ impl<const N: usize> Handler<Call<RepublishTfs>> for TfRepublisher<N> {
     }
 }
 
-impl<const N: usize> Handler<SubscribeFrames<N>> for TfRepublisher<N> {
-    type Result = ();
-
-    fn handle(&mut self, subscription: SubscribeFrames<N>, ctx: &mut Context<Self>) {
-        self.forget_gone();
-        let client = subscription.client();
-        let all = self.subscriptions.iter().enumerate();
-        let own = all.filter(|(_, (one, _))| one.client() == client);
-        let own: Vec<usize> = own.map(|(at, _)| at).collect();
-        if let [oldest, ..] = own[..]
-            && own.len() >= MAX_FRAME_SUBSCRIPTIONS
-            && let Some((oldest, _)) = self.subscriptions.remove(oldest)
-        {
-            oldest.end(GoalStatus::Aborted, Some(TOO_MANY));
-        }
-        self.subscriptions.push_back((subscription, Instant::now()));
-        self.keep_timer(ctx);
-    }
-}
-
 impl<const N: usize> Handler<ForwardGoal<FrameGoal<N>>> for TfRepublisher<N> {
     type Result = ();
 
     fn handle(&mut self, forwarded: ForwardGoal<FrameGoal<N>>, ctx: &mut Context<Self>) {
         let ForwardGoal { goal, client, .. } = forwarded;
-        let by = FrameReceiver::Client(Box::new(client));
-        self.handle(SubscribeFrames { goal, by }, ctx);
+        self.requests.retain(|request| !request.is_gone());
+        let is_own =
+            |request: &FrameRequest<N>| request.client.link.connection == client.link.connection;
+        let own = self.requests.iter().filter(|request| is_own(request));
+        if own.count() >= MAX_FRAME_SUBSCRIPTIONS
+            && let Some(oldest) = self.requests.iter().position(is_own)
+        {
+            self.requests
+                .remove(oldest)
+                .end(GoalStatus::Aborted, Some(TOO_MANY));
+        }
+        let due = Instant::now();
+        self.requests.push(FrameRequest { goal, client, due });
+        self.start_timer(ctx);
     }
 }
 
 impl<const N: usize> Handler<CancelSent> for TfRepublisher<N> {
     type Result = ();
 
-    fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
-        let is_meant = |subscription: &SubscribeFrames<N>| match &subscription.by {
-            FrameReceiver::Client(client) => cancel.is_of(client),
-            FrameReceiver::Topic { .. } => false,
-        };
-        loop {
-            let mut all = self.subscriptions.iter();
-            let at = all.position(|(subscription, _)| is_meant(subscription));
-            match at.and_then(|at| self.subscriptions.remove(at)) {
-                Some((subscription, _)) => subscription.end(GoalStatus::Canceled, None),
-                None => break cancel.refuse(NOT_KEPT),
-            }
-            if !cancel.all {
-                break;
-            }
+    fn handle(&mut self, cancel: CancelSent, _: &mut Context<Self>) {
+        let before = self.requests.len();
+        self.end_those(
+            GoalStatus::Canceled,
+            |FrameRequest { goal, client, .. }| goal.published.is_none() && cancel.is_of(client),
+        );
+        if self.requests.len() == before {
+            cancel.refuse(NOT_KEPT);
         }
-        self.keep_timer(ctx);
     }
 }
 
-impl<const N: usize> Handler<UnsubscribeFrames> for TfRepublisher<N> {
+impl<const N: usize> Handler<CancelPublished> for TfRepublisher<N> {
     type Result = ();
 
-    fn handle(&mut self, UnsubscribeFrames(id): UnsubscribeFrames, ctx: &mut Context<Self>) {
-        self.subscriptions
-            .retain(|(subscription, _)| match &subscription.by {
-                FrameReceiver::Client(_) => true,
-                FrameReceiver::Topic { id: own, .. } => id.as_ref().is_some_and(|id| id != own),
-            });
-        self.keep_timer(ctx);
+    fn handle(&mut self, CancelPublished(id): CancelPublished, _: &mut Context<Self>) {
+        let is_meant = |published: &PublishedGoal| id.as_ref().is_none_or(|id| *id == published.id);
+        self.end_those(GoalStatus::Canceled, |request| {
+            request.goal.published.as_ref().is_some_and(is_meant)
+        });
     }
 }
 
@@ -212,74 +183,58 @@ impl<const N: usize> Handler<Interest> for TfRepublisher<N> {
     fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
         if interest.topic == Topic::TfWeb {
             self.topic = interest.wanted.then(Instant::now);
+            self.start_timer(ctx);
         }
-        self.keep_timer(ctx);
     }
 }
 
 impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
     type Result = ();
 
-    fn handle(&mut self, _: ShutDown, ctx: &mut Context<Self>) {
-        for (subscription, _) in self.subscriptions.drain(..) {
-            subscription.end(GoalStatus::Aborted, None);
-        }
-        self.keep_timer(ctx);
+    fn handle(&mut self, _: ShutDown, _: &mut Context<Self>) {
+        self.end_those(GoalStatus::Aborted, |_| true);
     }
 }
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> SubscribeFrames<N> {
-    /// Informs a client with a goal of the action of its end, and of the reason if it has no result.
+impl<const N: usize> FrameRequest<N> {
+    /// Informs the client of the end, and of the reason if there is no result. A published goal ends silently.
     fn end(&self, status: GoalStatus, why: Option<&str>) {
-        let FrameReceiver::Client(client) = &self.by else {
-            return;
-        };
         match why {
-            Some(why) => client.fail(why, status),
-            None => client.conclude(Empty {}, status),
-        }
-    }
-
-    fn client(&self) -> ConnectionId {
-        match &self.by {
-            FrameReceiver::Client(client) => client.link.connection,
-            FrameReceiver::Topic { connection, .. } => *connection,
+            _ if self.goal.published.is_some() => {}
+            Some(why) => self.client.fail(why, status),
+            None => self.client.conclude(Empty {}, status),
         }
     }
 
     fn is_gone(&self) -> bool {
-        match &self.by {
-            FrameReceiver::Client(client) => client.link.is_gone(),
-            FrameReceiver::Topic { listening, .. } => listening.strong_count() == 0,
+        match &self.goal.published {
+            Some(published) => published.listening.strong_count() == 0,
+            None => self.client.link.is_gone(),
         }
     }
 }
 
 impl<const N: usize> TfRepublisher<N> {
-    fn forget_gone(&mut self) {
-        self.subscriptions
-            .retain(|(subscription, _)| !subscription.is_gone());
-    }
-
-    /// Runs a timer only while there are requests or subscribers.
-    fn keep_timer(&mut self, ctx: &mut Context<Self>) {
-        let is_wanted = self.topic.is_some() || !self.subscriptions.is_empty();
-        match self.timer {
-            None if is_wanted => self.timer = Some(ctx.run_interval(PERIOD, Self::send_on_timer)),
-            Some(timer) if !is_wanted => {
-                ctx.cancel_future(timer);
-                self.timer = None;
-            }
-            _ => {}
+    fn end_those(&mut self, status: GoalStatus, is_meant: impl Fn(&FrameRequest<N>) -> bool) {
+        for request in self.requests.extract_if(.., |request| is_meant(request)) {
+            request.end(status, None);
         }
     }
 
-    /// Requests the arm's pose, and sends the due messages.
+    fn start_timer(&mut self, ctx: &mut Context<Self>) {
+        self.timer
+            .get_or_insert_with(|| ctx.run_interval(PERIOD, Self::send_on_timer));
+    }
+
+    /// Requests the arm's pose, and sends the due messages. Stops when there are neither requests nor subscribers.
     fn send_on_timer(&mut self, ctx: &mut Context<Self>) {
-        self.forget_gone();
-        self.keep_timer(ctx);
+        self.requests.retain(|request| !request.is_gone());
+        if self.topic.is_none() && self.requests.is_empty() {
+            ctx.cancel_future(self.timer.take().unwrap_or_default());
+            return;
+        }
         let asked = self.arm.send(ArmPose).into_actor(self);
         ctx.wait(asked.map(|pose, node, _| {
             if let Ok(pose) = pose {
@@ -299,26 +254,28 @@ impl<const N: usize> TfRepublisher<N> {
         let latest = now + PERIOD / 2;
         if let Some(due) = self.topic.as_mut().filter(|due| **due <= latest) {
             *due = next_due(*due, TOPIC_PERIOD, now);
-            publish(&self.publish, Topic::TfWeb, seen(WORLD, &frames(N)));
+            let message = seen(WORLD, &frames(N));
+            self.publish
+                .do_send(Publish::made(Topic::TfWeb, move || message));
         }
-        let mut due: Vec<_> = self
-            .subscriptions
+        let due = self
+            .requests
             .iter_mut()
-            .filter(|(_, due)| *due <= latest)
-            .collect();
+            .filter(|request| request.due <= latest);
+        let mut due: Vec<_> = due.collect();
         // The longest overdue are first.
-        due.sort_by_key(|(_, due)| *due);
-        for (order, (subscription, due)) in (0..).zip(due.into_iter().take(AT_ONCE)) {
+        due.sort_by_key(|request| request.due);
+        for (order, FrameRequest { goal, client, due }) in (0..).zip(due.into_iter().take(AT_ONCE))
+        {
             // A nanosecond keeps the order, so requests that are always due take turns.
-            let sent = now + Duration::from_nanos(order);
-            *due = next_due(*due, subscription.goal.period, sent);
-            let message = seen(&subscription.goal.target, &subscription.goal.sources);
-            match &subscription.by {
-                FrameReceiver::Client(client) => client.feed_back(message),
-                FrameReceiver::Topic { id, .. } => {
-                    let message = published(stamp, id, &message);
-                    publish(&self.publish, Topic::TfWebFeedback, message);
-                }
+            *due = next_due(*due, goal.period, now + Duration::from_nanos(order));
+            let message = seen(&goal.target, &goal.sources);
+            if let Some(PublishedGoal { id, .. }) = &goal.published {
+                let message = published(stamp, id, &message);
+                self.publish
+                    .do_send(Publish::made(Topic::TfWebFeedback, move || message));
+            } else {
+                client.feed_back(message);
             }
         }
     }
@@ -336,8 +293,4 @@ fn published(stamp: Stamp, id: &str, feedback: &TfMessage) -> Value {
         "status": {"goal_id": {"stamp": stamp, "id": id}, "status": 1, "text": ""},
         "feedback": feedback,
     })
-}
-
-fn publish(to: &Recipient<Publish>, topic: Topic, message: impl Serialize + Send + 'static) {
-    to.do_send(Publish::made(topic, move || message));
 }

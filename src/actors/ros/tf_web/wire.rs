@@ -9,11 +9,10 @@ use actix::prelude::*;
 use bytes::Bytes;
 use serde_json::json;
 
-use super::{
-    FrameGoal, FrameReceiver, MAX_FRAMES, RepublishTfs, SubscribeFrames, TfRepublisher,
-    UnsubscribeFrames,
+use super::{CancelPublished, FrameGoal, MAX_FRAMES, PublishedGoal, RepublishTfs, TfRepublisher};
+use crate::actors::node::{
+    ActionClient, Address, Answered, Callable, ForwardGoal, Goal, Nodes, TopicMessage,
 };
-use crate::actors::node::{Address, Answered, Callable, Goal, Nodes, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::scene::{WORLD, is_frame};
@@ -31,16 +30,20 @@ impl<const N: usize> TfRepublisher<N> {
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<RepublishTfs>(Service::RepublishTfs, address.clone());
         nodes.serve_action::<FrameGoal<N>, _>(address.clone());
-        let subscribe = |(id, goal), message: TopicMessage| {
-            let by = FrameReceiver::Topic {
-                id,
-                connection: message.link.connection,
-                listening: message.listening,
+        let start = |(id, goal), message: TopicMessage| {
+            let listening = message.listening;
+            let published = Some(PublishedGoal { id, listening });
+            let client = ActionClient {
+                link: message.link,
+                action: Action::TfSubscription.name().into(),
+                id: message.id,
+                wants_feedback: false,
             };
-            SubscribeFrames { goal, by }
+            let (goal, done) = (FrameGoal { published, ..goal }, message.done);
+            ForwardGoal { goal, client, done }
         };
-        nodes.subscribe(Topic::TfWebGoal, address.clone(), read_goal::<N>, subscribe);
-        let cancel = |id, _| UnsubscribeFrames(id);
+        nodes.subscribe(Topic::TfWebGoal, address.clone(), read_goal::<N>, start);
+        let cancel = |id, _| CancelPublished(id);
         nodes.subscribe(Topic::TfWebCancel, address.clone(), read_cancel, cancel);
         for topic in [Topic::TfWeb, Topic::TfWebFeedback] {
             nodes.publishers.insert(topic, address.clone().recipient());
@@ -112,6 +115,7 @@ impl<const N: usize> FrameGoal<N> {
             sources,
             target: target.unwrap_or_default().into_owned(),
             period: Duration::from_secs_f64(rate.max(LEAST_RATE).recip()),
+            published: None,
         }
     }
 }
