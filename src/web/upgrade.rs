@@ -3,7 +3,7 @@
 //! **Invariant:** only the protocol itself is accepted: no extension and no subprotocol.
 
 use bytes::Bytes;
-use hyper::header::{SEC_WEBSOCKET_VERSION, UPGRADE};
+use hyper::header::{CONNECTION, HeaderValue, SEC_WEBSOCKET_VERSION, UPGRADE};
 use hyper::{Request, StatusCode};
 use tungstenite::error::{Error, ProtocolError};
 use tungstenite::handshake::server::create_response;
@@ -20,7 +20,15 @@ pub fn is_wanted(request: &RequestHead) -> bool {
 /// The answer to a handshake. After the status 101 the stream is a WebSocket.
 #[must_use]
 pub fn accept(request: &RequestHead) -> HttpResponse {
-    match create_response(&Request::from_parts(request.0.clone(), ())) {
+    let mut head = request.0.clone();
+    // Both headers are lists, on one line or several (RFC 9110, sections 5.3 and 7.8). `create_response` accepts only one
+    // protocol, and reads only one line.
+    for (name, word) in [(UPGRADE, "websocket"), (CONNECTION, "upgrade")] {
+        if request.has_word(name.as_str(), word) {
+            head.headers.insert(name, HeaderValue::from_static(word));
+        }
+    }
+    match create_response(&Request::from_parts(head, ())) {
         Ok(answer) => answer.map(|()| Bytes::new().into()),
         Err(Error::Protocol(ProtocolError::MissingSecWebSocketVersionHeader)) => {
             let sentence = "this runtime supports only version 13 of the WebSocket protocol";
