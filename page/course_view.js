@@ -7,7 +7,7 @@ import { Chart, drawBars, drawErrors, drawMap, drawPicture, ROOMY } from "./char
 import { followEnergy, ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
 import { announce, byId, el, passFocus, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
-import { duration, inPageNames, METHODS, seconds, shortName } from "./format.js";
+import { duration, inPageNames, METHODS, multipleOf, partOf, seconds, shortName } from "./format.js";
 import { ENERGY, newest, record, VELOCITY } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
 import { drawLadder, settingsKey } from "./ladder_panel.js";
@@ -279,10 +279,15 @@ async function runScene(scene) {
 
 /** The clock of a step: its slider, its present value and its limit [ms]. */
 function clock(one) {
-  if (one.dial !== "timestep") return { label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => setPeriod({ period: seconds(ms) }), value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state) };
-  const inErrors = one.chart === "errors"; // there the period does not change
-  const commit = (ms) => setIntegrator({ timestep: inErrors ? partOfPeriod(ms) : seconds(ms) });
-  return { label: "timestep", unit: "ms", low: 0.1, high: inErrors ? 4 : 100, commit, value: () => 1e3 * (state.integrator?.timestep ?? NaN), limit: () => 1e3 * limitInForce(state).limit };
+  if (one.dial !== "timestep") {
+    return {
+      label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => setPeriod({ period: seconds(ms) }), value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state),
+      fit: (ms) => multipleOf(1e3 * state.integrator.timestep, ms), rule: "it must be a whole number of timesteps",
+    };
+  }
+  // In the chart of errors the period does not change.
+  const whole = one.chart === "errors" ? { high: 4, fit: (ms) => partOf(1e3 * (state.period?.period ?? 0), ms), rule: "it must divide the control period" } : { high: 100 };
+  return { label: "timestep", unit: "ms", low: 0.1, ...whole, commit: (ms) => setIntegrator({ timestep: seconds(ms) }), value: () => 1e3 * (state.integrator?.timestep ?? NaN), limit: () => 1e3 * limitInForce(state).limit };
 }
 
 /** The one slider of a step, with its mark. */
@@ -301,12 +306,6 @@ function makeDial(one) {
   dial = { show: () => { field.accept(Number(value().toPrecision(6))); field.mark(one.guess && !now.ticked ? NaN : limit()); } };
   place.append(field.element);
   dial.show();
-}
-
-/** The timestep nearest to `ms` that divides the control period, so the period does not change [s]. */
-function partOfPeriod(ms) {
-  const whole = state.period?.period ?? 0;
-  return Number((whole / Math.max(1, Math.round(whole / (ms / 1e3)))).toPrecision(9));
 }
 
 function showBig() {

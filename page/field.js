@@ -8,18 +8,21 @@ import { watch } from "./store.js";
 
 const SLIDER_STEPS = 400;
 const SEND_MS = 70;
+/** Digits by which two values are compared. The conversion of units changes the last ones. */
+const DIGITS = 12;
 let nextId = 1;
 
-/** The place for a refusal, shown until its cause is gone. `describes` are its controls. */
+/** The place for a refusal or a note, shown until its cause is gone. `describes` are its controls. */
 export function refusal(...describes) {
   const text = el("p", { class: "refusal", id: `refusal-${nextId}` });
   nextId += 1;
   for (const one of describes) one.setAttribute("aria-describedby", text.id);
-  const show = (status) => {
+  const show = (status, isNote = false) => {
     const words = inPageNames(status);
     setText(text, words);
+    text.classList.toggle("note", isNote);
     for (const one of describes) {
-      if (status) one.setAttribute("aria-invalid", "true");
+      if (status && !isNote) one.setAttribute("aria-invalid", "true");
       else one.removeAttribute("aria-invalid");
     }
     if (words) warn(words);
@@ -78,9 +81,10 @@ async function withoutFigure(call) {
  * @param {boolean} [options.zero] whether the left end means 0
  * @param {string} [options.zeroText] what 0 means, in words under the left end
  * @param {(value: number) => Promise<{result: boolean, status: string, values: any}>} options.commit
+ * @param {(value: number) => number} [options.fit] the value that is sent for a chosen one @param {string} [options.rule] the reason for it
  * @param {string} [options.className] of the slider
  */
-export function numberField({ label, short = label, unit, low, high, log = false, zero = false, zeroText = "", commit, className = "" }) {
+export function numberField({ label, short = label, unit, low, high, log = false, zero = false, zeroText = "", commit, fit = (value) => value, rule = "", className = "" }) {
   const id = `field-${nextId}`;
   nextId += 1;
   const input = el("input", { type: "number", step: "any", id, inputmode: "decimal", autocomplete: "off" });
@@ -92,6 +96,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
   input.placeholder = "–"; // until the runtime has answered
   const said = refusal(input);
   let accepted = NaN;
+  let shown = ""; // the text of the accepted value
   let marked = NaN;
   let pending = 0;
 
@@ -108,30 +113,36 @@ export function numberField({ label, short = label, unit, low, high, log = false
   };
   const show = () => {
     if (pending > 0) return;
-    input.value = plain(accepted);
+    // A typed value keeps its digits.
+    if (parseFloat(input.value).toPrecision(DIGITS) !== accepted.toPrecision(DIGITS)) input.value = plain(accepted);
+    shown = input.value;
     slider.value = String(toSlider(accepted));
     describe();
   };
   const submit = async (value) => {
     pending += 1;
-    await said.report(unit === "ms" ? withoutFigure(commit(value)) : commit(value));
+    const answer = await said.report(unit === "ms" ? withoutFigure(commit(value)) : commit(value));
     pending -= 1;
     show();
+    return answer;
   };
-  const slide = latestOnly(submit, SEND_MS);
+  const slide = latestOnly((value) => submit(fit(value)), SEND_MS);
 
   slider.addEventListener("input", () => {
     input.value = plain(fromSlider(Number(slider.value)));
     slide(Number(input.value));
   });
-  const typed = () => {
-    if (input.value === plain(accepted)) return;
+  const typed = async () => {
+    if (input.value === shown) return;
     if (input.value === "") {
       said.show(`${label} must be a number`);
       show();
-    } else {
-      submit(Number(input.value));
+      return;
     }
+    const value = Number(input.value);
+    const used = fit(value);
+    const { result } = await submit(used);
+    if (result && used !== value) said.show(`The ${label} is ${plain(used)} ${unit}, because ${rule}.`, true);
   };
   input.addEventListener("input", () => said.show(""));
   input.addEventListener("change", typed);
@@ -148,7 +159,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
     /** Sets the runtime's value. It is not shown while a change is pending or the user types. */
     accept(value) {
       if (value === accepted) return;
-      const typing = document.activeElement === input && input.value !== plain(accepted);
+      const typing = document.activeElement === input && input.value !== shown;
       accepted = value;
       if (typing) return;
       said.show("");
@@ -179,7 +190,7 @@ export function option({ label, unit = "", value = "", placeholder = "", choices
   return {
     element: el("label", { class: "option" }, el("span", {}, label), el("span", { class: "with-unit" }, input, ...(unit ? [el("span", { class: "unit" }, unit)] : []))),
     input,
-    /** `undefined` if the field is empty. */
-    number: () => (input.value === "" ? undefined : Number(input.value)),
+    /** `undefined` if the field is empty, NaN if its text is no number. */
+    number: () => (input.validity.badInput ? NaN : input.value === "" ? undefined : Number(input.value)),
   };
 }

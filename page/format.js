@@ -55,6 +55,16 @@ export function plain(value) {
   return Number.isFinite(value) ? String(Number(value.toPrecision(4))) : "";
 }
 
+/** A time near `value` that divides `whole`. Refused values are left to the runtime. @param {number} value @param {number} whole */
+export function partOf(whole, value) {
+  return value > 0 && whole > 0 ? Number((whole / Math.max(1, Math.round(whole / value))).toPrecision(9)) : value;
+}
+
+/** The multiple of `unit` nearest to `value`, at least one. @param {number} value @param {number} unit */
+export function multipleOf(unit, value) {
+  return value > 0 && unit > 0 ? Number((unit * Math.max(1, Math.round(value / unit))).toPrecision(9)) : value;
+}
+
 /** Milliseconds as seconds, without rounding digits of the division. @param {number} ms */
 export function seconds(ms) {
   return Number((ms / 1e3).toPrecision(15));

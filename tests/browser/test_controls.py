@@ -64,8 +64,9 @@ class Controls(PageTest):
         self.wait(lambda: self.values("/arm_sim/set_integrator") == {"method": "euler", "timestep": 0.002}, "integrator")
         self.page.fill(self.field("masses-fields", 2), "2.5")
         self.page.fill(self.field("lengths-fields", 1), "0.8")
-        self.page.fill(self.field("gravity-field"), "3.3")
-        self.wait(lambda: self.values("/arm_sim/set_params") == {"gravity": 3.3, "masses": [1, 2.5], "lengths": [0.8, 1]}, "parameters")
+        self.page.fill(self.field("gravity-field"), "9.80665")
+        self.wait(lambda: self.values("/arm_sim/set_params") == {"gravity": 9.80665, "masses": [1, 2.5], "lengths": [0.8, 1]}, "parameters")
+        self.assertEqual(self.page.run(f"document.querySelector('{self.field('gravity-field')}').value"), "9.80665", "not rounded")
         before = self.values("/pid_controller/set_gains")
         for gain, joint, value in (("kp", 1, 900), ("ki", 2, 0), ("kd", 1, 77)):
             self.page.fill(self.field(f"{gain}-fields", joint), str(value))
@@ -158,9 +159,10 @@ class Controls(PageTest):
         self.assertFalse(self.runtime.next("/ik_trial/status")["running"])
         self.page.click("#trial-skip")
         self.page.until("document.querySelector('#trial-body .refusal').textContent", why="refusal of a skip")
-        self.page.fill("#trial-body .option:nth-of-type(1) input", "-4")
-        self.page.click("#trial-start")
-        self.page.until("document.querySelector('#trial-body .refusal').textContent.includes('duration')", why="refusal of a duration")
+        for typed, why in (("-4", "duration must be greater than 0, got -4"), ("1e", "duration must be a number")):
+            self.page.fill("#trial-body .option:nth-of-type(1) input", typed)
+            self.page.click("#trial-start")
+            self.page.until(f"document.querySelector('#trial-body .refusal').textContent === '{why}'", why=f"refusal of {typed}")
 
     # Comparison
 

@@ -50,7 +50,7 @@ class Tasks(CourseTest):
     def test_holding_ticks_when_the_tip_arrives(self):
         self.page.run("document.querySelector('input[name=drag][value=setpoint]').click(), document.querySelectorAll('#goal-body input')[4].value = 100")  # as left in the Workbench
         self.page.click("#course-start")
-        self.wait(lambda: self.values("/pid_controller/enable")["data"], "the controller")
+        self.page.until("document.querySelector('#controller').checkVisibility() && document.querySelector('#controller').textContent === 'Controller on'", why="keys may change it")
         self.page.drag(self.on_canvas((1.9, 0.1)), self.on_canvas((0.6, 1.2)))
         self.done("the tip has arrived")
         self.wait(lambda: math.dist(self.runtime.end_effector(), (0.6, 1.2)) < 0.02, "where the drag ended")
@@ -101,6 +101,8 @@ class Tasks(CourseTest):
         self.assertEqual(self.page.text("#course-caption"), "Two errors of one move: Midpoint, control period 4 ms")
         self.runtime.call("/arm_sim/set_integrator", method="verlet")
         self.page.until("document.querySelector('#course-caption').textContent.includes('Verlet')")
+        self.page.fill(DIAL, "3")
+        self.page.until(f"document.querySelector('#course-dial .refusal').textContent === 'The timestep is 4 ms, because it must divide the control period.' && !document.querySelector('{DIAL}').ariaInvalid")
         self.assertAlmostEqual(self.values("/pid_controller/set_period")["effective_period"], 0.004, delta=1e-9)
 
     def test_less_damping_makes_the_period_stable(self):
