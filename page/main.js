@@ -55,7 +55,7 @@ startCourse();
 startViews();
 
 // On a small screen less important parts are folded.
-if (matchMedia("(max-width: 779px)").matches) {
+if (innerWidth < 48.75 * parseFloat(getComputedStyle(document.documentElement).fontSize)) {
   for (const one of document.querySelectorAll("#controls > details:nth-of-type(n + 3)")) one.removeAttribute("open");
 }
 

@@ -7,9 +7,9 @@ from stage import PageTest
 
 AXE = pathlib.Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 PANELS = ("plots", "stability", "error", "compare", "tasks")
-# Captions and figures in sight that are not whole.
-CLIPPED = """[...document.querySelectorAll('figcaption, figure')].filter((one) => one.checkVisibility()
-    && (one.scrollWidth > one.clientWidth || one.scrollHeight > one.clientHeight)).map((one) => one.textContent)"""
+# Parts in sight whose content is wider than they are, and captions and figures that are not whole.
+CLIPPED = """[...document.querySelectorAll('figcaption, figure, main, section, details, .segment, input[type=number]')].filter((one) => one.checkVisibility()
+    && (one.scrollWidth > one.clientWidth || (one.matches('figcaption, figure') && one.scrollHeight > one.clientHeight))).map((one) => one.id || one.textContent)"""
 # Pairs of readouts whose texts overlap.
 OVERLAPS = """(() => {
   const boxes = [...document.querySelectorAll('.readouts > div')].map((one) => {
@@ -127,19 +127,20 @@ class Laptop(Free, Steady, PageTest):
         for _ in range(40):
             self.assertEqual(self.page.run(CLIPPED), [])
             time.sleep(0.1)
-        self.tab("stability")
-        self.page.until("document.querySelector('#map-value').textContent.length > 3")
-        self.assertEqual(self.page.run(CLIPPED), [])
 
 
 class Narrow(PageTest):
     view = {"width": 320, "height": 700, "density": 2, "touch": True}
 
-    def test_captions_are_whole(self):
-        for panel, figure in (("plots", "legend-drift"), ("stability", "map-value")):
-            self.tab(panel)
-            self.page.until(f"document.querySelector('#{figure}').textContent.length > 3")
-            self.assertEqual(self.page.run(CLIPPED), [])
+    def test_captions_are_whole_also_where_text_alone_is_enlarged(self):
+        for width, height, size in ((320, 700, 100), (1280, 720, 100), (1280, 720, 200), (1024, 768, 200), (390, 844, 200)):
+            self.page.send("Emulation.setDeviceMetricsOverride", {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500})
+            self.page.run(f"document.documentElement.style.fontSize = '{size}%'")
+            self.assertEqual(self.page.run("getComputedStyle(document.querySelector('#kp-fields label')).fontSize"), f"{12 * size // 100}px")
+            for panel, figure in (("plots", "legend-drift"), ("stability", "map-value")):
+                self.tab(panel)
+                self.page.until(f"document.querySelector('#{figure}').textContent.length > 3")
+                self.assertEqual(self.page.run(CLIPPED), [], f"{width} px, text at {size} %")
 
 
 class Phone(Free, Steady, Access, PageTest):
@@ -148,7 +149,6 @@ class Phone(Free, Steady, Access, PageTest):
     def test_arm_integrator_and_controller_come_first(self):
         tops = self.page.run("['#arm', '#transport', '#methods', '#kp-fields', '#panel'].map((one) => document.querySelector(one).getBoundingClientRect().top)")
         self.assertEqual(tops, sorted(tops))
-        self.assertEqual(self.page.run("document.documentElement.scrollWidth"), 390)
 
     def test_settings_that_fold_show_that_they_do(self):
         marks = lambda: self.page.run("[...document.querySelectorAll('#controls summary')].map((one) => getComputedStyle(one, '::before').content[1])")

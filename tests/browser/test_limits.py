@@ -5,6 +5,7 @@ import math
 import time
 
 from stage import NUMBER, PageTest, milliseconds, needs_server
+from test_layout import CLIPPED
 FREE = {key: [0, 0] for key in ("kp", "ki", "kd")}
 
 
@@ -203,6 +204,4 @@ class Right(PageTest):
         self.page.run("own('runtime.js').then((arm) => arm.sendSetpoint([-3.75616e73, 3.00591098005247]))")
         self.page.until(f"document.querySelector('#setpoint-fields {NUMBER}').value === '-3.756e+73'")
         self.assertEqual(self.setpoint_fields()[1], 3.006)
-        clipped = self.page.run("[...document.querySelectorAll('input[type=number]')].filter((one) => one.checkVisibility()"
-                                " && one.scrollWidth > one.clientWidth).map((one) => one.value)")
-        self.assertEqual(clipped, [])
+        self.assertEqual(self.page.run(CLIPPED), [])
