@@ -1,4 +1,5 @@
-//! Topics for 3D tools: `/tf` at every tick, `/tf_static` and `/robot_description` once and at every change of the arm.
+//! Topics for 3D tools: `/tf` at every tick, all frames relative to the world at every second one, `/tf_static` and
+//! `/robot_description` once and at every change of the arm.
 //!
 //! **Invariant:** nothing is computed for a topic without subscribers.
 
@@ -6,18 +7,27 @@ use super::{LiveArm, World};
 use crate::math::arm::Arm;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::Stamp;
-use crate::protocol::messages::scene::{StringMessage, fixed_frames, moving_frames};
+use crate::protocol::messages::scene::{
+    StringMessage, WORLD, fixed_frames, frames, moving_frames, seen_from,
+};
 use crate::protocol::ros::{srdf, urdf};
 use crate::services::arm::joint_names;
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
-    /// Publishes `/tf`, if it has subscribers.
+    /// Publishes `/tf`, and at every second tick all frames relative to the world, if they have subscribers.
     pub(super) fn publish_transforms(&self, stamp: Stamp) {
+        let lengths = *self.simulation.arm().lengths();
+        let positions = self.simulation.state().position;
         if self.counts.wants(Topic::Tf) {
-            let lengths = *self.simulation.arm().lengths();
-            let positions = self.simulation.state().position;
             self.publish(Topic::Tf, move || {
                 moving_frames(stamp, &lengths, &positions)
+            });
+        }
+        if self.counts.wants(Topic::TfWeb) && self.counts.ticks.is_multiple_of(2) {
+            self.publish(Topic::TfWeb, move || {
+                let (all, positions) = (frames(N), positions.as_slice());
+                let all = all.iter().map(String::as_str);
+                seen_from(stamp, WORLD, all, &lengths, positions)
             });
         }
     }

@@ -73,7 +73,7 @@ table! {
             .latched(),
         /// Every frame relative to `world`, 30 Hz, for web viewers.
         TfWeb = published(
-            "/tf2_web_republisher/frames", Node::TfRepublisher, "tf2_web_republisher/msg/TFArray", TRANSFORMS),
+            "/tf2_web_republisher/frames", Node::ArmSim, "tf2_web_republisher/msg/TFArray", TRANSFORMS),
         /// A viewer's request for frames, as roslib 1 sends it.
         TfWebGoal = subscribed("/tf2_web_republisher/goal", Node::TfRepublisher,
             "tf2_web_republisher/msg/TFSubscriptionActionGoal", fields![

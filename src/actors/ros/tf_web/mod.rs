@@ -1,13 +1,13 @@
 //! `tf2_web_republisher`: frames for web viewers that cannot combine chains of frames.
 //!
-//! The service returns the name of a topic that has every frame relative to the world. A client can also send a goal,
-//! by the action or by the topics of a ROS 1 action (as roslib 1 does). It then gets the requested frames as
+//! The service returns the name of the arm's topic that has every frame relative to the world. A client can also send a
+//! goal, by the action or by the topics of a ROS 1 action (as roslib 1 does). It then gets the requested frames as
 //! feedback, relative to the requested frame, at its rate.
 //!
 //! A request ends with its connection. A published one also ends when that connection unsubscribes from the feedback.
 //!
-//! **Invariant:** nothing is requested from the arm without a request and a subscriber. A connection has
-//! at most [`MAX_FRAME_SUBSCRIPTIONS`] requests.
+//! **Invariant:** nothing is requested from the arm without a request. A connection has at most
+//! [`MAX_FRAME_SUBSCRIPTIONS`] requests.
 
 mod wire;
 
@@ -19,11 +19,9 @@ use serde_json::{Value, json};
 use tokio::time::Instant;
 
 use crate::actors::arm::sim::{ArmPose, Pose};
-use crate::actors::node::{
-    ActionClient, Ask, Call, CancelSent, ForwardGoal, Interest, Publish, ShutDown,
-};
+use crate::actors::node::{ActionClient, Ask, Call, CancelSent, ForwardGoal, Publish, ShutDown};
 use crate::protocol::catalog::Topic;
-use crate::protocol::messages::scene::{TfMessage, WORLD, frames, seen_from};
+use crate::protocol::messages::scene::{TfMessage, seen_from};
 use crate::protocol::messages::{Empty, Header, Stamp};
 use crate::protocol::op::GoalStatus;
 
@@ -33,8 +31,6 @@ pub const MAX_FRAME_SUBSCRIPTIONS: usize = 4;
 pub const MAX_FRAMES: usize = 32;
 /// Time between two requests to the arm, and so the shortest time between two messages.
 const PERIOD: Duration = Duration::from_micros(16_667);
-/// Time between two messages of the topic.
-const TOPIC_PERIOD: Duration = Duration::from_millis(33);
 /// Most messages of all goals per tick, at 60 ticks a second. A message takes up to 30 us of the gateway's
 /// thread, and a published one is sent to all subscribers.
 const AT_ONCE: usize = 5;
@@ -87,8 +83,6 @@ pub struct TfRepublisher<const N: usize> {
     publish: Recipient<Publish>,
     /// Oldest first.
     requests: Vec<FrameRequest<N>>,
-    /// When the topic is due next, while it has subscribers.
-    topic: Option<Instant>,
     timer: Option<SpawnHandle>,
 }
 
@@ -107,7 +101,6 @@ impl<const N: usize> TfRepublisher<N> {
             arm,
             publish,
             requests: Vec::new(),
-            topic: None,
             timer: None,
         }
     }
@@ -147,7 +140,8 @@ impl<const N: usize> Handler<ForwardGoal<FrameGoal<N>>> for TfRepublisher<N> {
         }
         let due = Instant::now();
         self.requests.push(FrameRequest { goal, client, due });
-        self.start_timer(ctx);
+        self.timer
+            .get_or_insert_with(|| ctx.run_interval(PERIOD, Self::send_on_timer));
     }
 }
 
@@ -174,17 +168,6 @@ impl<const N: usize> Handler<CancelPublished> for TfRepublisher<N> {
         self.end_those(GoalStatus::Canceled, |request| {
             request.goal.published.as_ref().is_some_and(is_meant)
         });
-    }
-}
-
-impl<const N: usize> Handler<Interest> for TfRepublisher<N> {
-    type Result = ();
-
-    fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
-        if interest.topic == Topic::TfWeb {
-            self.topic = interest.wanted.then(Instant::now);
-            self.start_timer(ctx);
-        }
     }
 }
 
@@ -223,15 +206,10 @@ impl<const N: usize> TfRepublisher<N> {
         }
     }
 
-    fn start_timer(&mut self, ctx: &mut Context<Self>) {
-        self.timer
-            .get_or_insert_with(|| ctx.run_interval(PERIOD, Self::send_on_timer));
-    }
-
-    /// Requests the arm's pose, and sends the due messages. Stops when there are neither requests nor subscribers.
+    /// Requests the arm's pose, and sends the due messages. Stops when there are no requests.
     fn send_on_timer(&mut self, ctx: &mut Context<Self>) {
         self.requests.retain(|request| !request.is_gone());
-        if self.topic.is_none() && self.requests.is_empty() {
+        if self.requests.is_empty() {
             ctx.cancel_future(self.timer.take().unwrap_or_default());
             return;
         }
@@ -246,18 +224,8 @@ impl<const N: usize> TfRepublisher<N> {
     /// Sends the messages that are due at this pose of the arm.
     fn send_due(&mut self, pose: &Pose<N>) {
         let (now, stamp) = (Instant::now(), Stamp::from_seconds(pose.time));
-        let seen = |target: &str, sources: &[String]| {
-            let sources = sources.iter().map(String::as_str);
-            seen_from(stamp, target, sources, &pose.lengths, &pose.state.position)
-        };
         // A message is sent at the nearest tick: the next tick would be later than this one is early.
         let latest = now + PERIOD / 2;
-        if let Some(due) = self.topic.as_mut().filter(|due| **due <= latest) {
-            *due = next_due(*due, TOPIC_PERIOD, now);
-            let message = seen(WORLD, &frames(N));
-            self.publish
-                .do_send(Publish::made(Topic::TfWeb, move || message));
-        }
         let due = self
             .requests
             .iter_mut()
@@ -267,9 +235,11 @@ impl<const N: usize> TfRepublisher<N> {
         due.sort_by_key(|request| request.due);
         for (order, FrameRequest { goal, client, due }) in (0..).zip(due.into_iter().take(AT_ONCE))
         {
-            // A nanosecond keeps the order, so requests that are always due take turns.
-            *due = next_due(*due, goal.period, now + Duration::from_nanos(order));
-            let message = seen(&goal.target, &goal.sources);
+            // A delay of up to a period is made up. A nanosecond keeps the order, so requests that are always due take turns.
+            *due = (*due + goal.period).max(now + Duration::from_nanos(order));
+            let sources = goal.sources.iter().map(String::as_str);
+            let (lengths, positions) = (&pose.lengths, &pose.state.position);
+            let message = seen_from(stamp, &goal.target, sources, lengths, positions);
             if let Some(PublishedGoal { id, .. }) = &goal.published {
                 let message = published(stamp, id, &message);
                 self.publish
@@ -279,11 +249,6 @@ impl<const N: usize> TfRepublisher<N> {
             }
         }
     }
-}
-
-/// The next due time of a message that was due at `due` and is sent `now`. A delay of up to a period is made up.
-fn next_due(due: Instant, period: Duration, now: Instant) -> Instant {
-    (due + period).max(now)
 }
 
 /// A `tf2_web_republisher/TFSubscriptionActionFeedback` under the id of the request. The status 1 is `active` in ROS 1.

@@ -45,9 +45,6 @@ impl<const N: usize> TfRepublisher<N> {
         nodes.subscribe(Topic::TfWebGoal, address.clone(), read_goal::<N>, start);
         let cancel = |id, _| CancelPublished(id);
         nodes.subscribe(Topic::TfWebCancel, address.clone(), read_cancel, cancel);
-        for topic in [Topic::TfWeb, Topic::TfWebFeedback] {
-            nodes.publishers.insert(topic, address.clone().recipient());
-        }
     }
 }
 
