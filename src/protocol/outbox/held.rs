@@ -1,6 +1,6 @@
 //! Throttled topics: which messages are held back, and when they enter the queue.
 //!
-//! **Invariant:** a message that is held back has the place in the order at which it is released.
+//! **Invariant:** a held message gets its place in the queue when it is released.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

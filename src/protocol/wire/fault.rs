@@ -1,6 +1,6 @@
 //! Why a part of the stream is not a frame, and the bytes that are kept of it.
 //!
-//! **Invariant:** the number of kept bytes is bounded.
+//! **Invariant:** at most [`KEPT_START`] bytes are kept.
 
 use super::text;
 use crate::protocol::limits::MAX_NESTING;
