@@ -9,8 +9,8 @@
 //! question, and the form of an error.
 //!
 //! **Invariant:** every [`Call`] is answered exactly once, even if its node fails: a [`Reply`] or a [`Caller`] that is
-//! dropped unanswered sends an error. A node sees no JSON. Arguments are read before a node gets the call, never on the
-//! node's thread, and its answer is written on the thread that answers. Feedback of a goal may be dropped for a slow
+//! dropped unanswered sends an error. A node parses no JSON. Arguments are read before a node gets the call, never on the
+//! arm's thread, and its answer is written on the thread that answers. Feedback of a goal may be dropped for a slow
 //! client. The end of a goal is never dropped, and follows all feedback.
 
 use std::collections::HashMap;
@@ -69,8 +69,8 @@ impl Unserved {
     pub const CALLER_GONE: Self = Self("the caller is gone");
 }
 
-/// A guard of an op that has not yet taken effect: a call, a goal, or a message for its subscribers. The
-/// connection reads the client's next frame once the last clone is dropped.
+/// A guard of an op that has not yet taken effect: a call, a goal, a message for a node, or a long
+/// message that is being encoded. The connection reads the client's next frame once the last clone is dropped.
 pub type Done = Arc<oneshot::Sender<()>>;
 
 /// A guard, and a receiver that ends with its last clone.
@@ -230,7 +230,7 @@ impl Publish {
     }
 }
 
-/// A frame for one client. From a node, or from the client's own connection.
+/// A frame for one client. From a node, or from the route to it if the arguments are rejected.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Respond {

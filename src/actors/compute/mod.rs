@@ -1,4 +1,5 @@
-//! Work that takes longer than a turn of an actor: a pool of workers, and the services that compute on it.
+//! Work that takes longer than a turn of an actor: the computations of each client, a pool of workers, and the services
+//! that compute on it.
 //!
 //! **Invariant:** nothing here blocks an actor's thread for longer than a slice.
 

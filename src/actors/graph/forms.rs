@@ -1,7 +1,6 @@
 //! Topic messages in the forms that subscribers requested.
 //!
-//! **Invariant:** a form is made once for all clients. A long message is encoded on a worker thread, and its publisher
-//! waits.
+//! **Invariant:** a form is made once for all clients.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

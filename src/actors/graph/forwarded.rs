@@ -95,7 +95,7 @@ impl ForwardedRequests {
 
     /// The number of the request with this `id`, if `provider` serves it. Without an id, it is the only request that
     /// waits for `provider`, if its name is `name`.
-    pub fn meant(
+    pub fn find_answered(
         &self,
         kind: Served,
         id: Option<&Payload>,
@@ -118,20 +118,20 @@ impl ForwardedRequests {
         (is_theirs && is_meant && !is_late).then_some(number)
     }
 
-    /// Removes and returns the request that [`meant`](Self::meant) finds.
-    pub fn take_meant(
+    /// Removes and returns the request that [`find_answered`](Self::find_answered) finds.
+    pub fn take_answered(
         &mut self,
         kind: Served,
         id: Option<&Payload>,
         name: Option<&str>,
         provider: ConnectionId,
     ) -> Option<Forwarded> {
-        let number = self.meant(kind, id, name, provider)?;
+        let number = self.find_answered(kind, id, name, provider)?;
         self.take(number)
     }
 
     /// The newest goal of `caller` with this `id`, and its id at the provider.
-    pub fn goal_made_under(
+    pub fn newest_goal(
         &self,
         id: Option<&Payload>,
         name: &str,

@@ -1,5 +1,5 @@
-//! The graph, as in ROS: who publishes, subscribes and serves what, and the forms of messages that subscribers requested.
-//! The registry keeps these tables.
+//! The graph, as in ROS: the topics, services and actions of clients, and the calls and goals that wait for them. Also the
+//! forms of messages that subscribers requested, and the refusals of ops. The registry keeps the tables.
 //!
 //! **Invariant:** nothing here sends a message or waits. A table never has more entries than its clients' limits allow.
 

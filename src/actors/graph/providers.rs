@@ -1,5 +1,4 @@
-//! The names that clients serve to others: services and actions. They and the topics are sorted, so that listing them
-//! needs no search.
+//! The names that clients serve to others: services and actions. They and the topics are kept sorted for the lists.
 //!
 //! **Invariant:** the table has a name exactly as long as a client has registered it.
 

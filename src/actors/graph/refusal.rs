@@ -1,6 +1,7 @@
 //! The reasons for which an op or a call is refused, as clients read them.
 //!
-//! **Invariant:** every sentence begins with its field, or names the service.
+//! **Invariant:** a sentence about a field begins with the field, and a sentence about a call or goal names its service
+//! or action.
 
 use super::registrations::TooMuchRegistered;
 use crate::actors::resources::memory::MAX_BACKLOG;

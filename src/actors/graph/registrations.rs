@@ -9,8 +9,8 @@ use std::sync::Arc;
 
 use crate::protocol::op::Served;
 
-/// Bytes that the registry keeps of one connection: subscriptions, advertisements, services, and calls and goals that
-/// wait for other clients.
+/// Most bytes that the registry keeps of one connection: subscriptions, advertisements, services, and calls and goals
+/// that wait for other clients.
 pub const MAX_REGISTERED: usize = 128 * 1024;
 /// Bytes of each entry in the tables, without three times its names.
 pub const ENTRY_BYTES: usize = 640;

@@ -1,4 +1,4 @@
-//! The topics of clients: who publishes, and who subscribes, with which throttle and encoding.
+//! The topics that clients use: their publishers, and their subscribers with throttle and encoding.
 //!
 //! **Invariant:** the table has a topic exactly as long as a client publishes or subscribes to it. Subscribers keep the
 //! order of their subscriptions.

@@ -1,6 +1,6 @@
-//! Sockets that listen, and the options of the sockets that they accept. Says why listening is impossible.
+//! Sockets that listen, the options of the sockets that they accept, and the reason if listening is impossible.
 //!
-//! **Invariant:** a port that was just released can be bound at once.
+//! **Invariant:** on Unix a port that was just released can be bound at once.
 
 use std::io::{Error, ErrorKind};
 use std::net::SocketAddr;

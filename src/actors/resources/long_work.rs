@@ -15,8 +15,9 @@ use crate::actors::panics::contain;
 use crate::actors::resources::work_clock;
 use crate::protocol::limits::MEDIUM;
 
-/// Longest frame that is read, and longest message that is encoded, on the gateway's thread \[bytes\]. Either takes about
-/// a tenth of a millisecond. All clients may have such work at once, and a light call waits for all of it.
+/// Longest frame that is parsed on the gateway's thread, and longest message of a client that is encoded there in a form
+/// other than plain JSON \[bytes\]. Either takes about a tenth of a millisecond. All clients may have such work at once,
+/// and a light call waits for all of it.
 pub const SHORT_WORK: usize = 16 * 1024;
 /// Most active threads for each kind of work.
 pub const PLACES: usize = 2;

@@ -1,4 +1,4 @@
-//! Shared resources of all nodes: places, counted memory, measured work time, threads for long work, and the operating
+//! Shared resources: places, counted memory, gauges, turns, measured work time, threads for long work, and the operating
 //! system's sockets and files.
 //!
 //! **Invariant:** nothing here imports a node, so every node can use it.

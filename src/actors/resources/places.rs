@@ -1,7 +1,7 @@
-//! The places of the clients: their number, the kept ones, and the rate of warnings that none is free. And the slots of
-//! newcomers, which have no place yet.
+//! The places of the clients: their number, the kept ones, and the rate of warnings that none is free. Newcomers have
+//! slots instead.
 //!
-//! **Invariant:** a client with a place keeps it until it disconnects. Only the oldest newcomer is evicted.
+//! **Invariant:** no more clients get a place than there are places. Only the oldest newcomer is evicted.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;
@@ -74,7 +74,7 @@ impl Places {
     }
 
     /// Whether there is a place for one more client when `taken` places are in use.
-    pub(in crate::actors) const fn take(
+    pub(in crate::actors) const fn check_free(
         &self,
         taken: usize,
         may_use_kept: bool,
@@ -184,10 +184,16 @@ mod tests {
     fn a_sixteenth_of_the_places_is_kept_and_never_the_last_one() {
         for (clients, kept) in [(1, 0), (2, 1), (8, 1), (17, 2), (256, 16), (4096, 16)] {
             let places = Places::of(clients);
-            assert!(places.take(clients - kept - 1, false).is_ok(), "{clients}");
-            assert!(places.take(clients - kept, false).is_err(), "{clients}");
-            assert!(places.take(clients - 1, true).is_ok(), "{clients}");
-            assert!(places.take(clients, true).is_err(), "{clients}");
+            assert!(
+                places.check_free(clients - kept - 1, false).is_ok(),
+                "{clients}"
+            );
+            assert!(
+                places.check_free(clients - kept, false).is_err(),
+                "{clients}"
+            );
+            assert!(places.check_free(clients - 1, true).is_ok(), "{clients}");
+            assert!(places.check_free(clients, true).is_err(), "{clients}");
         }
     }
 

@@ -1,6 +1,6 @@
 //! The frames of answers and requests to one client: responses, goals and statuses.
 //!
-//! **Invariant:** an answer has the `id` of its request, unchanged.
+//! **Invariant:** an answer has the `id` of its request, as its [`Payload`] writes it.
 
 use bytes::Bytes;
 use serde::Serialize;

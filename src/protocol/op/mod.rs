@@ -2,8 +2,9 @@
 //!
 //! Payloads (`msg`, `args`, `values`) stay raw. Only the syntax of a forwarded payload is parsed.
 //!
-//! **Invariant:** every frame gives exactly one operation or exactly one error that names the fault, and its `id` in
-//! both cases. A member is read only for operations that have it. For all others only its syntax is checked.
+//! **Invariant:** every frame gives exactly one operation or exactly one error that names the fault. Both have the `id`
+//! of a frame that is valid JSON. A member is read only for operations that have it. For all others only its syntax is
+//! checked.
 
 pub mod fields;
 mod problems;
@@ -38,7 +39,7 @@ const MAX_PARSER_MESSAGE: usize = 160;
 /// A parsed frame.
 #[derive(Debug)]
 pub struct Incoming {
-    /// The sender's `id`, unchanged, also if the operation has an error.
+    /// The sender's `id`, also if the operation has an error. A frame that is not valid JSON has none.
     pub id: Option<Payload>,
     /// The operation.
     pub op: Result<Op, OpError>,

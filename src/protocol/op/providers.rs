@@ -1,6 +1,7 @@
 //! Reads goals, and the operations of clients that serve a service or an action.
 //!
-//! **Invariant:** an answer has the `id` of its call or goal. A frame with a bad answer says which call or goal fails.
+//! **Invariant:** an answer has the `id` of its call or goal. A bad answer names its call or goal, if it
+//! has an `id` or the name.
 
 use std::borrow::Cow;
 

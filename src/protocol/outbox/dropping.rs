@@ -81,7 +81,7 @@ impl Outbox {
     }
 
     /// Drops the first topic message if it is too old to be taken only because a response follows it. Returns `false`
-    /// if it is not too old.
+    /// if it is not too old, or is the newest of its topic.
     pub(super) fn drop_stale(&mut self, now: Instant) -> bool {
         let is_stale = |first: &QueuedMessage| first.is_older(self.fresh, now);
         self.topics.front().is_some_and(is_stale) && self.drop_but_newest(0)

@@ -1,6 +1,7 @@
 //! A topic message that waits in the outbox, or a series of them.
 //!
-//! **Invariant:** a message from a series does not keep the others in memory.
+//! **Invariant:** a message that is held back, or kept as the newest of its topic, does not keep the others of its series
+//! in memory.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

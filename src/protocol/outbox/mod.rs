@@ -6,7 +6,8 @@
 //!
 //! A [series](crate::protocol::wire::series) is queued as one piece, but dropped and held back message by message.
 //!
-//! A message that has waited for longer than [`MAX_AGE`] is dropped, except the newest of its topic.
+//! A message that has waited for longer than [`MAX_AGE`], or for half of it if the client is behind, is dropped, except
+//! the newest of its topic.
 //!
 //! The caller passes the time. The outbox has no socket and no clock.
 //!

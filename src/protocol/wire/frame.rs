@@ -6,7 +6,7 @@
 //!
 //! Messages that need no parsing (see [`series`]) are taken unchanged.
 //!
-//! **Invariant:** no byte is read more than twice. At most one incomplete frame and the last chunk are kept.
+//! **Invariant:** no byte is read more than three times. At most one incomplete frame and the last chunk are kept.
 
 use bytes::Bytes;
 
@@ -22,7 +22,7 @@ const KEPT_BUFFER: usize = 16 * 1024;
 
 /// The part of the stream that the reader is in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Within {
+enum ScanState {
     /// Between frames: white space.
     Between,
     /// In an object that is kept.
@@ -57,7 +57,7 @@ pub struct FrameReader {
     start: usize,
     /// How far the buffer has been scanned.
     at: usize,
-    state: Within,
+    state: ScanState,
     nesting: Nesting,
     /// Longest frame.
     limit: usize,
@@ -85,7 +85,7 @@ impl FrameReader {
             buffer: Vec::new(),
             start: 0,
             at: 0,
-            state: Within::Between,
+            state: ScanState::Between,
             nesting: Nesting::new(),
             limit,
             refused: Vec::new(),
@@ -101,7 +101,7 @@ impl FrameReader {
     /// The series of messages at the present position, if there is one, limited in length. Call this before the next
     /// frame.
     pub fn series(&mut self) -> Option<Series> {
-        if self.state != Within::Between {
+        if self.state != ScanState::Between {
             return None;
         }
         let rest = self.rest();
@@ -139,15 +139,15 @@ impl FrameReader {
     /// Whether a frame has begun and not ended. A skipped frame does not count, because none of it is kept.
     #[must_use]
     pub fn is_unfinished(&self) -> bool {
-        matches!(self.state, Within::Object | Within::Line)
+        matches!(self.state, ScanState::Object | ScanState::Line)
     }
 
     /// Ends the stream, after the last frame was taken. An incomplete frame is one malformed frame.
     pub fn finish(&mut self) -> Option<FrameError> {
         let error = match self.state {
-            Within::Object => Some(FrameError::StreamEnded),
-            Within::Line => Some(self.line_error()),
-            Within::Between | Within::SkippedObject | Within::SkippedLine => None,
+            ScanState::Object => Some(FrameError::StreamEnded),
+            ScanState::Line => Some(self.line_error()),
+            ScanState::Between | ScanState::SkippedObject | ScanState::SkippedLine => None,
         };
         *self = Self::with_limit(self.limit);
         error
@@ -188,10 +188,10 @@ impl FrameReader {
         self.start = self.at;
         match first {
             Some(b'{') => {
-                self.state = Within::Object;
+                self.state = ScanState::Object;
                 self.nesting = Nesting::new();
             }
-            Some(_) => self.state = Within::Line,
+            Some(_) => self.state = ScanState::Line,
             None => {}
         }
     }
@@ -201,11 +201,11 @@ impl FrameReader {
         let rest = self.rest();
         let newline = rest.iter().position(|&byte| byte == b'\n');
         let length = newline.unwrap_or(rest.len());
-        if self.state == Within::SkippedLine {
+        if self.state == ScanState::SkippedLine {
             self.at += length;
             self.start = self.at;
             if newline.is_some() {
-                self.state = Within::Between;
+                self.state = ScanState::Between;
             }
             return None;
         }
@@ -215,7 +215,7 @@ impl FrameReader {
             return None;
         }
         let error = self.line_error();
-        self.state = Within::SkippedLine;
+        self.state = ScanState::SkippedLine;
         self.start = self.at;
         Some(error)
     }
@@ -230,7 +230,7 @@ impl FrameReader {
             .nesting
             .scan(self.buffer.get(self.at..).unwrap_or_default());
         self.at += scanned;
-        let kept = self.state == Within::Object;
+        let kept = self.state == ScanState::Object;
         if !kept {
             self.start = self.at;
         }
@@ -240,9 +240,9 @@ impl FrameReader {
         let state = match &event {
             None if !too_long => return None,
             Some(Event::Balanced) if kept && !too_long => return Some(Ok(self.take_frame())),
-            None | Some(Event::Fault(FrameError::TooDeep)) => Within::SkippedObject,
-            Some(Event::Fault(FrameError::Mismatch { .. })) => Within::SkippedLine,
-            Some(_) => Within::Between,
+            None | Some(Event::Fault(FrameError::TooDeep)) => ScanState::SkippedObject,
+            Some(Event::Fault(FrameError::Mismatch { .. })) => ScanState::SkippedLine,
+            Some(_) => ScanState::Between,
         };
         let error = match event {
             Some(Event::Fault(error)) if !too_long => error,
@@ -278,7 +278,7 @@ impl FrameReader {
             frame.unwrap_or_default().to_vec()
         };
         self.start = self.at;
-        self.state = Within::Between;
+        self.state = ScanState::Between;
         RawFrame {
             bytes,
             has_literals: Some(self.nesting.has_literals),
@@ -291,12 +291,12 @@ impl FrameReader {
     pub fn next_raw(&mut self) -> Option<Result<RawFrame, FrameError>> {
         loop {
             let found = match self.state {
-                Within::Between => {
+                ScanState::Between => {
                     self.skip_space();
                     None
                 }
-                Within::Object | Within::SkippedObject => self.scan_object(),
-                Within::Line | Within::SkippedLine => self.scan_line().map(Err),
+                ScanState::Object | ScanState::SkippedObject => self.scan_object(),
+                ScanState::Line | ScanState::SkippedLine => self.scan_line().map(Err),
             };
             if found.is_some() {
                 return found;

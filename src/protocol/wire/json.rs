@@ -3,7 +3,7 @@
 //! In forwarded payloads a number that overflows becomes `null`. `values.rs` has the values that the runtime reads
 //! itself.
 //!
-//! **Invariant:** one pass, linear in the length of any text. A [`Payload`] is read once, when it comes. Its text is
+//! **Invariant:** a fixed number of passes over any text. A [`Payload`] is checked when it comes. Its text is
 //! one line of valid JSON, ready to be copied.
 
 use std::borrow::Cow;
@@ -272,8 +272,8 @@ impl Payload {
 impl From<Box<RawValue>> for Payload {
     fn from(raw: Box<RawValue>) -> Self {
         let strict = strict(raw.get());
-        // Valid JSON has line ends between tokens only. Some readers take a carriage return for one: then what another
-        // client has put between two of them would be a frame to them.
+        // Valid JSON has line ends between tokens only. Some readers treat a carriage return as a line end. They would
+        // read the text between two of them as a frame.
         let line = match strict {
             text if text.contains('\r') || text.contains('\n') => {
                 Some(text.replace(['\r', '\n'], " "))

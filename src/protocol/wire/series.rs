@@ -1,8 +1,8 @@
 //! Messages that can be forwarded unchanged: a series of `publish` frames on one topic, one per line, each spelled
 //! as the runtime would write it.
 //!
-//! Most programs write their JSON in this form. Such a line is checked in one pass and forwarded unchanged,
-//! without parsing and encoding.
+//! Compact JSON in the order `op`, `topic`, `msg` has this form. Such a line is checked in one pass and forwarded
+//! unchanged, without parsing and encoding.
 //!
 //! **Invariant:** a series is forwarded byte for byte as the general reader and writer would do it. All other
 //! messages are left to these.

@@ -91,7 +91,7 @@ fn every_function_on_the_path_of_a_frame_exists() {
 fn the_walks_name_existing_files_and_become_no_longer() {
     let paper = text("ARCHITECTURE.md");
     let walks = [
-        ("message", 13),
+        ("message", 15),
         ("setpoint", 6),
         ("joint state", 5),
         ("call", 16),

@@ -20,7 +20,8 @@ use crate::web::Site;
 
 /// Bytes that a client may send before it has shown its token.
 pub const MAX_AUTH_BYTES: usize = 16 * 1024;
-/// Delay of the answer to a wrong token. In this time at most [`MAX_NEWCOMERS`](crate::actors::resources::places::MAX_NEWCOMERS) wrong tokens are answered. The
+/// Delay of the answer to a wrong token. In this time at most
+/// [`MAX_NEWCOMERS`](crate::actors::resources::places::MAX_NEWCOMERS) wrong tokens are answered. The
 /// [length](crate::protocol::op::token::MIN_TOKEN) of a token makes guessing hopeless.
 pub const WRONG_TOKEN_TIME: Duration = Duration::from_millis(500);
 

@@ -146,11 +146,11 @@ impl<S: ClientStream> Connection<S> {
 
     /// Refuses the client: it gets a status with the reason, and its further input is discarded.
     pub(super) fn refuse(&mut self, why: &str) {
-        self.refuse_in(messages::status(Level::Error, why, None));
+        self.refuse_with(messages::status(Level::Error, why, None));
     }
 
     /// The same, for a reason that is already a status.
-    pub(super) fn refuse_in(&mut self, status: Bytes) {
+    pub(super) fn refuse_with(&mut self, status: Bytes) {
         self.is_refused = true;
         self.backlog.fetch_add(status.len(), Ordering::Relaxed);
         self.push_response(status, &[]);

@@ -102,7 +102,7 @@ impl<S: ClientStream> Connection<S> {
                 Box::pin(reader)
             }
             Err(status) => {
-                self.refuse_in(status);
+                self.refuse_with(status);
                 self.is_finishing = true;
                 Box::pin(wrap_future(ready(())))
             }

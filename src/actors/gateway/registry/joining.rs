@@ -50,7 +50,7 @@ impl Handler<Connect> for Registry {
             return Err(Refused::Closed);
         }
         let taken = self.clients.len();
-        self.places.take(taken, connect.may_use_kept)?;
+        self.places.check_free(taken, connect.may_use_kept)?;
         self.connections_made += 1;
         let id = ConnectionId(self.connections_made);
         let link = ClientLink {
@@ -94,6 +94,29 @@ impl Handler<Disconnect> for Registry {
         if let Some(client) = self.clients.remove(&id) {
             client.link.gone.store(true, Ordering::Relaxed);
             self.gauges.set_connections(self.clients.len() as u64);
+        }
+    }
+}
+
+impl Registry {
+    /// Withdraws a client's registrations. The cleanup ends the calls and goals that wait for its answer, because there
+    /// may be many.
+    fn withdraw(&mut self, id: ConnectionId) {
+        let Some(client) = self.clients.get_mut(&id) else {
+            return;
+        };
+        let registered = std::mem::take(&mut client.registered);
+        for topic in registered.advertised.keys() {
+            self.topics.remove_publisher(topic);
+        }
+        for topic in &registered.subscribed {
+            self.drop_subscriber(topic, id);
+        }
+        for (kind, name) in registered.served.keys() {
+            self.providers.withdraw(*kind, name, id);
+        }
+        if self.requests.waiting_for(id).is_some() {
+            self.gone.push_back(id);
         }
     }
 }

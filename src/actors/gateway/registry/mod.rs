@@ -1,9 +1,9 @@
 //! The registry has every client, topic and service. It fans messages out to subscribers, and routes calls.
 //!
-//! This file has its state and its handlers. `subscriptions.rs`, `publishing.rs` and `requests.rs` have the rosbridge
-//! ops, and `actors/graph/` the tables.
+//! This file has its state, its messages and the path of an op. `joining.rs` has the clients that come and go,
+//! `subscriptions.rs`, `publishing.rs` and `requests.rs` the rosbridge ops, and `actors/graph/` the tables.
 //!
-//! **Invariant:** a message is encoded once for any number of subscribers, and not at all without subscribers. A
+//! **Invariant:** a message is encoded once for each spelling and form, and not at all without subscribers. A
 //! refused op changes nothing. It gets an error status, or the call's one response. Messages of one sender take effect
 //! in the order sent: the registry has one mailbox, and so has each connection.
 
@@ -362,8 +362,8 @@ pub struct Request {
     pub permit: Option<Permit>,
 }
 
-/// The op has been routed. A node or the subscribers' sockets may still have to process it. The receiver ends after
-/// that.
+/// The op has been routed. A node, or the encoding of a long message, may still be at work on it. The receiver ends
+/// after that.
 #[derive(MessageResponse, Default)]
 pub struct Handled(Option<oneshot::Receiver<()>>);
 
@@ -374,7 +374,7 @@ impl Handled {
         Self::default()
     }
 
-    /// The op was sent to its provider, or the message to its subscribers.
+    /// A node has the op, or its long message is being encoded.
     #[must_use]
     pub fn with(effect: oneshot::Receiver<()>) -> Self {
         Self(Some(effect))

@@ -54,7 +54,7 @@ impl Registry {
             return self.finish_delivery(long, ctx);
         };
         let (done, ended) = guard();
-        self.encode_aside(long, &done, ctx);
+        self.encode_on_worker(long, &done, ctx);
         if let Some(tap) = &mut self.tap {
             let frame = messages::publish_raw(topic.name(), &msg);
             tap(Tapped::Published(topic, &frame));
@@ -125,12 +125,12 @@ impl Registry {
             return Handled::at_once();
         }
         let (done, ended) = guard();
-        self.encode_aside(long, &done, ctx);
+        self.encode_on_worker(long, &done, ctx);
         Handled::with(ended)
     }
 
     /// Encodes long messages on worker threads, and delivers them.
-    fn encode_aside(&self, long: Vec<ToEncode>, done: &Done, ctx: &mut Context<Self>) {
+    fn encode_on_worker(&self, long: Vec<ToEncode>, done: &Done, ctx: &mut Context<Self>) {
         for message in long {
             let done = Done::clone(done);
             let kind = WorkKind::of(message.plain.len());

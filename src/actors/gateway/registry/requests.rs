@@ -366,7 +366,7 @@ impl Registry {
     /// Forwards the cancellation of a goal to its action server.
     fn forward_cancellation(&self, origin: &FrameOrigin, action: &str) -> Result<(), Refusal> {
         let requests = &self.requests;
-        let goal = requests.goal_made_under(origin.id.as_ref(), action, origin.from);
+        let goal = requests.newest_goal(origin.id.as_ref(), action, origin.from);
         let Some((id, goal)) = goal else {
             let name = names::absolute(action);
             return Err(match self.providers.provider(Served::Action, &name) {
@@ -414,7 +414,7 @@ impl Registry {
         values: &Payload,
     ) -> Result<(), Refusal> {
         let requests = &self.requests;
-        let meant = requests.meant(Served::Action, origin.id.as_ref(), None, origin.from);
+        let meant = requests.find_answered(Served::Action, origin.id.as_ref(), None, origin.from);
         let goal = meant.and_then(|number| requests.get(number));
         let goal = goal.ok_or_else(|| Refusal::StaleGoal(action.to_owned()))?;
         if !names::are_same(&goal.name, action) {
@@ -437,7 +437,7 @@ impl Registry {
         encode: impl FnOnce(&str, Option<&Payload>) -> Bytes,
     ) -> Result<(), Refusal> {
         let (requests, id) = (&mut self.requests, origin.id.as_ref());
-        let request = requests.take_meant(kind, id, None, origin.from);
+        let request = requests.take_answered(kind, id, None, origin.from);
         let request = request.ok_or_else(|| match kind {
             Served::Service => Refusal::StaleCall(name.to_owned()),
             Served::Action => Refusal::StaleGoal(name.to_owned()),
@@ -466,7 +466,7 @@ impl Registry {
     ) -> Result<(), Refusal> {
         let why = Refusal::Unreadable(problem);
         let (requests, id) = (&mut self.requests, origin.id.as_ref());
-        match requests.take_meant(kind, id, name, origin.from) {
+        match requests.take_answered(kind, id, name, origin.from) {
             Some(request) => self.discard(&request, why),
             None => Err(why),
         }

@@ -1,6 +1,7 @@
 //! Advertisements and subscriptions of clients.
 //!
-//! **Invariant:** a refused op changes nothing. The node that publishes a topic knows whether it has subscribers.
+//! **Invariant:** a refused op changes nothing. The node that publishes a topic is notified of its first subscriber and of
+//! the end of its last one.
 
 use std::sync::Arc;
 
@@ -167,29 +168,8 @@ impl Registry {
         }
     }
 
-    /// Withdraws a client's registrations. The cleanup ends the calls and goals that wait for its answer, because there
-    /// may be many.
-    pub(super) fn withdraw(&mut self, id: ConnectionId) {
-        let Some(client) = self.clients.get_mut(&id) else {
-            return;
-        };
-        let registered = std::mem::take(&mut client.registered);
-        for topic in registered.advertised.keys() {
-            self.topics.remove_publisher(topic);
-        }
-        for topic in &registered.subscribed {
-            self.drop_subscriber(topic, id);
-        }
-        for (kind, name) in registered.served.keys() {
-            self.providers.withdraw(*kind, name, id);
-        }
-        if self.requests.waiting_for(id).is_some() {
-            self.gone.push_back(id);
-        }
-    }
-
     /// Removes a subscriber from a topic, and notifies the topic's owner if it was the last one.
-    fn drop_subscriber(&mut self, topic: &str, connection: ConnectionId) {
+    pub(super) fn drop_subscriber(&mut self, topic: &str, connection: ConnectionId) {
         let name = names::absolute(topic);
         self.topics.remove_subscriber(&name, topic, connection);
         if let Some(client) = self.clients.get_mut(&connection)
