@@ -147,8 +147,8 @@ class Phone(Free, Steady, Access, PageTest):
     view = PHONE
 
     def test_arm_integrator_and_controller_come_first(self):
-        tops = self.page.run("['#arm', '#transport', '#methods', '#kp-fields', '#panel'].map((one) => document.querySelector(one).getBoundingClientRect().top)")
-        self.assertEqual(tops, sorted(tops))
+        tops, width = self.page.run("[['#arm', '#transport', '#methods', '#kp-fields', '#panel'].map((one) => document.querySelector(one).getBoundingClientRect().top), document.documentElement.scrollWidth]")
+        self.assertEqual((tops, width), (sorted(tops), 390))
 
     def test_settings_that_fold_show_that_they_do(self):
         marks = lambda: self.page.run("[...document.querySelectorAll('#controls summary')].map((one) => getComputedStyle(one, '::before').content[1])")
