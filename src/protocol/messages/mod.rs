@@ -125,11 +125,7 @@ impl Encoder {
 
     fn end(mut self) -> Bytes {
         self.text.extend_from_slice(b"}\n");
-        // The frame may wait for long, and only its bytes are counted, so its spare capacity is freed. A short frame is
-        // copied, because shrinking leaves a hole for the allocator to merge.
-        if self.text.len() <= USUAL_FRAME {
-            return Bytes::copy_from_slice(&self.text);
-        }
+        // The frame may wait for long, and only its bytes are counted, so its spare capacity is freed.
         self.text.shrink_to_fit();
         Bytes::from(self.text)
     }

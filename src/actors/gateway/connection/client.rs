@@ -188,8 +188,7 @@ impl<S: ClientStream> Connection<S> {
 
     /// Notes that `bytes` of the frames were written. Returns whether that allows the client to be read again.
     fn note_written(&mut self, bytes: usize) -> bool {
-        // Topic messages do not block the reader.
-        let may_read = self.outbox.response_bytes() == 0 || self.may_read();
+        let may_read = self.may_read();
         self.progress = Instant::now();
         self.flow.note_written(bytes, self.progress.into_std());
         let before = self.outbox.short_bytes();
