@@ -12,7 +12,7 @@ use super::node::{ArmSim, Steps, pass_barriers};
 use super::orders;
 use crate::actors::node::{Call, Nodes, ShutDown, Unserved};
 use crate::live::ArmRequest;
-use crate::protocol::catalog::{Direction, Node, Rosapi, Service, Topic};
+use crate::protocol::catalog::{Node, Rosapi, Service, Topic};
 use crate::services::arm::{
     AskParameters, Disturb, Enable, GetTime, Pause, Reset, SetGains, SetIntegrator, SetParams,
     SetPeriod, SetState, Step, parameter_services,
@@ -39,8 +39,7 @@ impl<const N: usize> ArmSim<N> {
             nodes.serve::<AskParameters<N>>(service, address.clone());
         }
         for topic in Topic::ALL {
-            let published = topic.direction() == Direction::Published;
-            if published && topic.owner() == Node::ArmSim {
+            if !topic.is_subscribed() && topic.owner() == Node::ArmSim {
                 let arm = address.clone().recipient();
                 nodes.publishers.insert(topic, arm);
             }

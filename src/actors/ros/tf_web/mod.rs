@@ -184,8 +184,10 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
 impl<const N: usize> FrameRequest<N> {
     /// Informs the client of the end, and of the reason if there is no result. A published goal ends silently.
     fn end(&self, status: GoalStatus, why: Option<&str>) {
+        if self.goal.published.is_some() {
+            return;
+        }
         match why {
-            _ if self.goal.published.is_some() => {}
             Some(why) => self.client.fail(why, status),
             None => self.client.conclude(Empty {}, status),
         }
@@ -210,7 +212,9 @@ impl<const N: usize> TfRepublisher<N> {
     fn send_on_timer(&mut self, ctx: &mut Context<Self>) {
         self.requests.retain(|request| !request.is_gone());
         if self.requests.is_empty() {
-            ctx.cancel_future(self.timer.take().unwrap_or_default());
+            if let Some(timer) = self.timer.take() {
+                ctx.cancel_future(timer);
+            }
             return;
         }
         let asked = self.arm.send(ArmPose).into_actor(self);
