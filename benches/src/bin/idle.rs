@@ -2,7 +2,8 @@
 //!
 //! `cargo run --release --bin idle -- PATH/TO/pendularm [SECONDS]`
 //!
-//! Default settings, no client during the measurement. Linux only: the figures are read from `/proc`.
+//! Default settings, no client during the measurement. Linux only: the figures are read from `/proc`. The arm wakes 60
+//! times a second, so beside it there is a loop that does nothing else.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -17,6 +18,17 @@ fn simulation_time(address: SocketAddr) -> (f64, Instant) {
     let clock = &client.message("/clock")["clock"];
     let number = |key: &str| clock[key].as_f64().expect("a number");
     (number("sec") + 1e-9 * number("nanosec"), Instant::now())
+}
+
+/// Wakes up 60 times a second for that time, and returns the part of a core that it takes.
+fn bare_wakeups(seconds: u64) -> f64 {
+    let tick = Duration::from_secs(1) / 60;
+    let (busy, began) = (processor(std::process::id()), Instant::now());
+    for wakeups in 1..=60 * u32::try_from(seconds).expect("an hour at most") {
+        std::thread::sleep((began + wakeups * tick).saturating_duration_since(Instant::now()));
+    }
+    let used = (processor(std::process::id()) - busy) as f64 * 1e-9;
+    used / began.elapsed().as_secs_f64()
 }
 
 fn main() {
@@ -42,6 +54,10 @@ fn main() {
     println!(
         "idle, no client      {:.3} % of one core over {wall:.1} s",
         100.0 * used / wall
+    );
+    println!(
+        "a bare loop          {:.3} % with 60 wake-ups a second",
+        100.0 * bare_wakeups(seconds)
     );
     println!("resident             {memory:.1} MB");
     println!("sim time / wall time {ratio:.6}");

@@ -8,4 +8,5 @@ pub mod forwarded;
 pub mod providers;
 pub(super) mod refusal;
 pub mod registrations;
+pub mod subscribers;
 pub mod topics;

@@ -1,33 +1,17 @@
-//! The topics that clients use: their publishers, and their subscribers with throttle and encoding.
+//! The topics that clients use: their publishers and their subscribers.
 //!
 //! **Invariant:** the table has a topic exactly as long as a client publishes or subscribes to it. Subscribers keep the
 //! order of their subscriptions.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
 
-use super::registrations::Entry;
+use super::subscribers::Subscriber;
 use crate::actors::ConnectionId;
 use crate::protocol::catalog::Topic;
 use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::names;
-use crate::protocol::op::{Compression, Encoding, Subscribe};
-use crate::protocol::outbox::Throttle;
 use crate::protocol::ros::rosapi::Listed;
-use crate::protocol::ros::stamps::is_ros1_name;
-
-/// One `subscribe` of a connection to a topic. `id` distinguishes several of them.
-#[derive(Debug)]
-pub struct Subscription {
-    /// The frame's `id`.
-    pub id: Option<Box<str>>,
-    throttle: Duration,
-    queue_length: usize,
-    encoding: Encoding,
-    /// Its part of the client's limit [`MAX_REGISTERED`](super::registrations::MAX_REGISTERED).
-    pub entry: Entry,
-}
 
 /// The topics, by their absolute names. `M` is the mailbox of a subscriber.
 pub struct Topics<M> {
@@ -42,39 +26,6 @@ struct TopicUsers<M> {
     type_name: Option<Arc<str>>,
     /// The first known type that a client named. Messages are encoded by it.
     known: Option<Type>,
-}
-
-/// A connection that subscribes to a topic under one spelling.
-pub struct Subscriber<M> {
-    /// The connection.
-    pub connection: ConnectionId,
-    /// Its spelling of the topic. Its messages have this name.
-    pub spelling: Arc<str>,
-    /// The way to it.
-    pub mailbox: M,
-    /// The merged encoding of its subscriptions.
-    pub encoding: Encoding,
-    subscriptions: Vec<Subscription>,
-}
-
-impl Subscription {
-    /// The subscription with this `id` of its frame. If it names the ROS 1 type of a topic of the runtime, stamps also
-    /// have the names of ROS 1. CDR has no names.
-    pub fn new(id: Option<Box<str>>, subscribe: &Subscribe, entry: Entry) -> Self {
-        let own = Topic::from_name(&subscribe.topic).filter(|topic| !topic.is_subscribed());
-        let mut asked = own.zip(subscribe.type_name.as_deref()).into_iter();
-        let is_ros1 = asked.any(|(topic, asked)| is_ros1_name(asked, topic.type_name()));
-        Self {
-            id,
-            throttle: subscribe.throttle,
-            queue_length: subscribe.queue_length,
-            encoding: Encoding {
-                ros1_stamps: is_ros1 && subscribe.encoding.compression != Compression::CborRaw,
-                ..subscribe.encoding
-            },
-            entry,
-        }
-    }
 }
 
 impl<M> Default for Topics<M> {
@@ -95,33 +46,6 @@ impl<M> Default for TopicUsers<M> {
     }
 }
 
-impl<M> Subscriber<M> {
-    /// The subscription with this `id`.
-    pub fn subscription(&self, id: Option<&str>) -> Option<&Subscription> {
-        let mut all = self.subscriptions.iter();
-        all.find(|one| one.id.as_deref() == id)
-    }
-
-    /// Ends the subscriptions that `stays` rejects, and adds `new`, if there is one.
-    pub fn change(&mut self, stays: impl FnMut(&Subscription) -> bool, new: Option<Subscription>) {
-        self.subscriptions.retain(stays);
-        self.subscriptions.extend(new);
-        let all = self.subscriptions.iter().map(|one| one.encoding);
-        self.encoding = all.reduce(Encoding::merged).unwrap_or_default();
-    }
-
-    /// The smallest of each value over its subscriptions. `None` if there are none.
-    pub fn throttle(&self) -> Option<Throttle> {
-        let all = &self.subscriptions;
-        let queue_lengths = || all.iter().map(|one| one.queue_length);
-        Some(Throttle {
-            interval: all.iter().map(|one| one.throttle).min()?,
-            held_back: queue_lengths().min()?.max(1),
-            queue_length: queue_lengths().filter(|length| *length > 0).min(),
-        })
-    }
-}
-
 impl<M> Topics<M> {
     /// A client has begun to advertise a topic.
     pub fn add_publisher(&mut self, topic: &str) {
@@ -137,13 +61,8 @@ impl<M> Topics<M> {
         mailbox: M,
     ) {
         let users = self.by_name.entry(topic.into()).or_default();
-        users.subscribers.push(Subscriber {
-            connection,
-            spelling,
-            mailbox,
-            encoding: Encoding::default(),
-            subscriptions: Vec::new(),
-        });
+        let subscriber = Subscriber::new(connection, spelling, mailbox);
+        users.subscribers.push(subscriber);
     }
 
     /// A client that uses a topic has named its type.

@@ -1,7 +1,8 @@
-//! Clients join and leave.
+//! Clients join and leave, and so do the nodes.
 //!
 //! **Invariant:** a client has one entry from [`Connect`] to [`Disconnect`]. Its registrations end when it stops sending.
 
+use std::collections::HashSet;
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -9,10 +10,13 @@ use std::sync::atomic::Ordering;
 use actix::prelude::*;
 use tokio::time::Instant;
 
-use super::{Client, Handled, Outlets, Registry};
+use super::{Client, Handled, Outlets, Registry, ToClient};
 use crate::actors::ConnectionId;
-use crate::actors::node::ClientLink;
+use crate::actors::graph::registrations::{EntrySum, Registrations};
+use crate::actors::node::{Attach, Barrier, ClientLink, FinishAll, TakeCensus, guard};
 use crate::actors::resources::places::Refused;
+use crate::protocol::messages::ErrorForm;
+use crate::protocol::op::Verbosity;
 
 /// A new client. From its connection. Returns its id.
 #[derive(Message)]
@@ -41,6 +45,23 @@ pub struct Retire(pub ConnectionId);
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Disconnect(pub ConnectionId);
+
+impl Client {
+    fn new(outlets: Outlets, from: IpAddr, link: ClientLink) -> Self {
+        Self {
+            outlets,
+            link,
+            from,
+            entries: EntrySum::default(),
+            registered: Registrations::default(),
+            withdrawn: HashSet::new(),
+            verbosity: Verbosity::ALL,
+            error_form: ErrorForm::default(),
+            listening: Arc::default(),
+            calls: Some(guard()),
+        }
+    }
+}
 
 impl Handler<Connect> for Registry {
     type Result = Result<ConnectionId, Refused>;
@@ -95,6 +116,38 @@ impl Handler<Disconnect> for Registry {
             client.link.gone.store(true, Ordering::Relaxed);
             self.gauges.set_connections(self.clients.len() as u64);
         }
+    }
+}
+
+impl Handler<Attach> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, Attach(nodes): Attach, _: &mut Context<Self>) {
+        self.nodes = nodes;
+    }
+}
+
+impl Handler<Barrier> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, _: Barrier, _: &mut Context<Self>) {}
+}
+
+impl Handler<FinishAll> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, _: FinishAll, _: &mut Context<Self>) {
+        for client in self.clients.values() {
+            client.outlets.mailbox.do_send(ToClient::Finish);
+        }
+    }
+}
+
+impl Handler<TakeCensus> for Registry {
+    type Result = MessageResult<TakeCensus>;
+
+    fn handle(&mut self, _: TakeCensus, _: &mut Context<Self>) -> Self::Result {
+        MessageResult(self.providers.census(self.topics.listed()))
     }
 }
 

@@ -1,22 +1,23 @@
 //! The registry has every client, topic and service. It fans messages out to subscribers, and routes calls.
 //!
 //! This file has its state, its messages and the path of an op. `joining.rs` has the clients that come and go,
-//! `subscriptions.rs`, `publishing.rs` and `requests.rs` the rosbridge ops, and `actors/graph/` the tables.
+//! `subscriptions.rs`, `publishing.rs` and `requests.rs` the rosbridge ops, `forms.rs` the messages that are encoded in
+//! another form, and `actors/graph/` the tables.
 //!
 //! **Invariant:** a message is encoded once for each spelling and form, and not at all without subscribers. A
 //! refused op changes nothing. It gets an error status, or the call's one response. Messages of one sender take effect
 //! in the order sent: the registry has one mailbox, and so has each connection.
 
+mod forms;
 mod joining;
 mod publishing;
 mod requests;
 mod subscriptions;
 
 use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
-use std::fmt::Display;
 use std::net::IpAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize};
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -27,15 +28,16 @@ use crate::actors::ConnectionId;
 use crate::actors::graph::forwarded::ForwardedRequests;
 use crate::actors::graph::providers::Providers;
 use crate::actors::graph::registrations::{EntrySum, Registrations};
-use crate::actors::graph::topics::{self, Topics};
+use crate::actors::graph::subscribers;
+use crate::actors::graph::topics::Topics;
 pub use crate::actors::node::{Attach, FinishAll, Nodes, RefuseCalls, SetTap, Tapped};
-use crate::actors::node::{Barrier, ClientLink, Done, FrameKind, Respond, TakeCensus, Tap, guard};
+use crate::actors::node::{ClientLink, Done, Tap};
 use crate::actors::resources::gauges::Gauges;
-use crate::actors::resources::memory::{MAX_BACKLOG, Permit, SHORT, cover};
+use crate::actors::resources::memory::Permit;
 use crate::actors::resources::places::Places;
 use crate::protocol::catalog::{Service, Topic};
-use crate::protocol::messages::{self, ErrorForm, Level};
-use crate::protocol::op::{GoalStatus, Incoming, Op, OpError, Verbosity};
+use crate::protocol::messages::ErrorForm;
+use crate::protocol::op::{Incoming, Op, Verbosity};
 use crate::protocol::outbox::Throttle;
 use crate::protocol::wire::json::Payload;
 
@@ -68,7 +70,7 @@ pub struct Registry {
 }
 
 /// A subscriber, with the mailbox of its connection.
-type Subscriber = topics::Subscriber<Recipient<ToClient>>;
+type Subscriber = subscribers::Subscriber<Recipient<ToClient>>;
 
 /// The registry's entry of one client.
 struct Client {
@@ -118,57 +120,6 @@ impl Registry {
     }
 }
 
-impl Client {
-    fn new(outlets: Outlets, from: IpAddr, link: ClientLink) -> Self {
-        Self {
-            outlets,
-            link,
-            from,
-            entries: EntrySum::default(),
-            registered: Registrations::default(),
-            withdrawn: HashSet::new(),
-            verbosity: Verbosity::ALL,
-            error_form: ErrorForm::default(),
-            listening: Arc::default(),
-            calls: Some(guard()),
-        }
-    }
-
-    /// Sends a status, a forwarded call or another client's response.
-    fn send(&self, frame: Bytes) {
-        self.respond(frame, None);
-    }
-
-    /// Sends a response. `service` is the responding service, if it is the runtime's own.
-    fn respond(&self, frame: Bytes, service: Option<Service>) {
-        if frame.len() <= SHORT {
-            self.outlets
-                .backlog
-                .fetch_add(frame.len(), Ordering::Relaxed);
-        }
-        let response = ToClient::Respond { frame, service };
-        self.outlets.mailbox.do_send(response);
-    }
-
-    /// Sends feedback of a goal. It may be dropped.
-    fn deliver_feedback(&self, frame: Bytes) {
-        let topic = None;
-        self.outlets
-            .mailbox
-            .do_send(ToClient::Deliver { topic, frame });
-    }
-
-    /// Bytes of responses that wait to be written to it.
-    fn backlog(&self) -> usize {
-        self.outlets.backlog.load(Ordering::Relaxed)
-    }
-
-    /// Whether its short responses wait beyond the limit. Then other clients' calls and answers to it are refused.
-    fn is_congested(&self) -> bool {
-        self.backlog() > MAX_BACKLOG
-    }
-}
-
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
 impl Actor for Registry {
@@ -177,20 +128,6 @@ impl Actor for Registry {
     fn started(&mut self, ctx: &mut Context<Self>) {
         Self::start_cleanup(ctx);
     }
-}
-
-impl Handler<Attach> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, Attach(nodes): Attach, _: &mut Context<Self>) {
-        self.nodes = nodes;
-    }
-}
-
-impl Handler<Barrier> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, _: Barrier, _: &mut Context<Self>) {}
 }
 
 impl Handler<Request> for Registry {
@@ -213,49 +150,6 @@ impl Handler<Request> for Registry {
         };
         self.permit = None;
         handled
-    }
-}
-
-impl Handler<Respond> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
-        let Some(client) = self.clients.get(&respond.connection) else {
-            return;
-        };
-        match respond.kind {
-            FrameKind::Status(level) if !client.verbosity.wants(level) => {}
-            FrameKind::Status(_) | FrameKind::End => client.send(respond.frame),
-            FrameKind::Feedback => client.deliver_feedback(respond.frame),
-            FrameKind::Answer(service) => {
-                if let Some(tap) = &mut self.tap {
-                    tap(Tapped::Answered {
-                        to: respond.connection,
-                        service,
-                        frame: &respond.frame,
-                    });
-                }
-                client.respond(respond.frame, Some(service));
-            }
-        }
-    }
-}
-
-impl Handler<TakeCensus> for Registry {
-    type Result = MessageResult<TakeCensus>;
-
-    fn handle(&mut self, _: TakeCensus, _: &mut Context<Self>) -> Self::Result {
-        MessageResult(self.providers.census(self.topics.listed()))
-    }
-}
-
-impl Handler<FinishAll> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, _: FinishAll, _: &mut Context<Self>) {
-        for client in self.clients.values() {
-            client.outlets.mailbox.do_send(ToClient::Finish);
-        }
     }
 }
 
@@ -303,37 +197,6 @@ impl Registry {
             self.refuse(&origin, &why);
         }
         Handled::at_once()
-    }
-
-    /// Answers a frame that has no op: by the response of its call, by the result of its goal, or by a status.
-    fn answer_error(&self, origin: &FrameOrigin, why: &OpError) {
-        match why {
-            OpError::Call { service, problem } => self.refuse_call(origin, service, problem, None),
-            OpError::Goal { action, problem } => {
-                self.end_goal(origin, action, problem, GoalStatus::Unknown);
-            }
-            OpError::Status(problem) => self.refuse(origin, problem),
-        }
-    }
-
-    /// Sends an error status with the reason to the sender of a refused frame.
-    fn refuse(&self, origin: &FrameOrigin, why: &impl Display) {
-        let why = why.to_string();
-        tracing::debug!(connection = origin.from.0, why, "refused");
-        self.send_status(origin, Level::Error, &why);
-    }
-
-    fn send_status(&self, origin: &FrameOrigin, level: Level, msg: &str) {
-        if let Some(client) = self.clients.get(&origin.from)
-            && client.verbosity.wants(level)
-        {
-            client.send(self.covered(messages::status(level, msg, origin.id.as_ref())));
-        }
-    }
-
-    /// The frame with the memory permit of the long frame from which it was made.
-    fn covered(&self, frame: Bytes) -> Bytes {
-        cover(self.permit.as_ref(), frame)
     }
 }
 

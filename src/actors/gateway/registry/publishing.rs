@@ -13,10 +13,9 @@ use super::subscriptions::discard_held;
 use super::{FrameOrigin, Handled, Registry, Subscriber, ToClient};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::MAX_LONG_FORMS;
-use crate::actors::graph::forms::{Made, ToEncode};
+use crate::actors::graph::forms::ToEncode;
 use crate::actors::graph::refusal;
-use crate::actors::node::{Done, Publish, SetTap, Tapped, TopicMessage, guard};
-use crate::actors::resources::long_work::{WorkKind, run_long_work};
+use crate::actors::node::{Publish, Tapped, TopicMessage, guard};
 use crate::actors::resources::memory::cover_message;
 use crate::protocol::catalog::Topic;
 use crate::protocol::limits::MEDIUM;
@@ -128,77 +127,6 @@ impl Registry {
         self.encode_on_worker(long, &done, ctx);
         Handled::with(ended)
     }
-
-    /// Encodes long messages on worker threads, and delivers them.
-    fn encode_on_worker(&self, long: Vec<ToEncode>, done: &Done, ctx: &mut Context<Self>) {
-        for message in long {
-            let done = Done::clone(done);
-            let kind = WorkKind::of(message.plain.len());
-            let count = message.recipients.len() as u64;
-            let making = run_long_work(kind, move || (message.make(), message));
-            ctx.spawn(making.into_actor(self).map(move |made, registry, _| {
-                match made {
-                    Some((made, message)) => registry.deliver_made(&message, &made),
-                    None => registry.gauges.add_dropped(count),
-                }
-                drop(done);
-            }));
-        }
-    }
-
-    /// Delivers a message in one form to its recipients that are still subscribed, even if they have requested another
-    /// form since.
-    fn deliver_made(&self, message: &ToEncode, made: &Made) {
-        let topic = names::absolute(&message.spelling);
-        // Both lists have the same order.
-        let mut left = self.topics.subscribers(&topic).iter();
-        for recipient in &message.recipients {
-            let mut rest = left.clone();
-            if let Some(subscriber) = rest.find(|one| Arc::ptr_eq(recipient, &one.spelling)) {
-                self.deliver_form(subscriber, made);
-                left = rest;
-            }
-        }
-    }
-
-    /// Delivers the messages of a form. Messages that could not be made count as dropped.
-    fn deliver_form(&self, subscriber: &Subscriber, made: &Made) {
-        self.gauges.add_dropped(made.lost);
-        for frame in &made.messages {
-            deliver(subscriber, frame.clone());
-        }
-    }
-
-    /// Delivers a latched topic's last message to a new subscription.
-    pub(super) fn deliver_latched(&self, spelling: &str, to: ConnectionId) {
-        let latched = Topic::from_name(spelling).map(|topic| (topic, self.latched.get(&topic)));
-        let Some((topic, Some(frame))) = latched else {
-            return;
-        };
-        let mut all = self.topics.subscribers(topic.name()).iter();
-        if let Some(subscriber) = all.find(|one| one.connection == to && *one.spelling == *spelling)
-        {
-            let plain = messages::respelled(topic.name(), spelling, frame);
-            if subscriber.encoding.keeps(plain.len()) {
-                return deliver(subscriber, plain);
-            }
-            let message = self.to_encode(subscriber, plain);
-            self.deliver_form(subscriber, &message.make());
-        }
-    }
-
-    /// A JSON frame, or a series of frames, to encode in the form that the subscriber requested.
-    fn to_encode(&self, subscriber: &Subscriber, plain: Bytes) -> ToEncode {
-        ToEncode {
-            spelling: Arc::clone(&subscriber.spelling),
-            plain,
-            encoding: subscriber.encoding,
-            recipients: vec![Arc::clone(&subscriber.spelling)],
-            type_name: self.topics.known_type(&subscriber.spelling),
-            fragmented: Arc::clone(&self.fragmented),
-            permit: self.permit.clone(),
-        }
-    }
 }
 
 impl Handler<Publish> for Registry {
@@ -233,27 +161,8 @@ impl Handler<Publish> for Registry {
     }
 }
 
-impl Handler<SetTap> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, SetTap(tap): SetTap, _: &mut Context<Self>) {
-        let was_set = self.tap.is_some();
-        self.tap = tap;
-        for topic in Topic::ALL {
-            if self.topics.subscribers(topic.name()).is_empty() {
-                match (was_set, self.tap.is_some()) {
-                    (_, true) => self.notify_owner(topic.name(), true),
-                    (true, false) => self.note_unwanted(topic.name()),
-                    (false, false) => {}
-                }
-            } else if let (Some(frame), Some(tap)) = (self.latched.get(&topic), &mut self.tap) {
-                tap(Tapped::Published(topic, frame));
-            }
-        }
-    }
-}
-
-fn deliver(subscriber: &Subscriber, frame: Bytes) {
+/// Sends a frame of the topic to its connection.
+pub(super) fn deliver(subscriber: &Subscriber, frame: Bytes) {
     let topic = Some(Arc::clone(&subscriber.spelling));
     subscriber
         .mailbox

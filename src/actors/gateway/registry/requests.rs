@@ -1,10 +1,11 @@
-//! Routes calls and goals to the node or client that serves them, and clients' answers back to the callers.
+//! Routes calls and goals to the node or client that serves them, and answers back to the callers. Refuses ops.
 //!
 //! **Invariant:** every call has one response. Every goal has one `action_result`, unless its sender disconnects first.
 
 use std::fmt::Display;
 use std::pin::Pin;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
@@ -12,22 +13,22 @@ use bytes::Bytes;
 use serde_json::json;
 use tokio::time::Instant;
 
-use super::{Client, FrameOrigin, Handled, Registry};
+use super::{Client, FrameOrigin, Handled, Registry, ToClient};
 use crate::actors::gateway::limits::DEFAULT_TIMEOUT;
 use crate::actors::graph::forwarded::Forwarded;
 use crate::actors::graph::refusal::{self, Refusal};
 use crate::actors::node::{
-    ActionClient, ActionRequest, Caller, CancelSent, Done, ForwardGoal, RefuseCalls, Route,
-    ServiceCall, Tapped, guard,
+    ActionClient, ActionRequest, Caller, CancelSent, Done, ForwardGoal, FrameKind, RefuseCalls,
+    Respond, Route, ServiceCall, Tapped, guard,
 };
-use crate::actors::resources::memory::{MAX_BACKLOG, cover_message};
+use crate::actors::resources::memory::{MAX_BACKLOG, SHORT, cover, cover_message};
 use crate::actors::resources::turns::{Timer, end_turn};
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
 use crate::protocol::op::fields::mistyped;
 use crate::protocol::op::{
-    ActionGoal, Arguments, CallService, GoalStatus, Problem, ProviderOp, Served,
+    ActionGoal, Arguments, CallService, GoalStatus, OpError, Problem, ProviderOp, Served,
 };
 use crate::protocol::wire::json::Payload;
 use crate::services::{Address, NoService};
@@ -521,6 +522,102 @@ impl Registry {
             let frame = messages::action_result(action, id, &why, status as u8, false);
             client.send(self.covered(frame));
         }
+    }
+}
+
+// ---- what a client gets ---------------------------------------------------------------------------------------------
+
+impl Handler<Respond> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
+        let Some(client) = self.clients.get(&respond.connection) else {
+            return;
+        };
+        match respond.kind {
+            FrameKind::Status(level) if !client.verbosity.wants(level) => {}
+            FrameKind::Status(_) | FrameKind::End => client.send(respond.frame),
+            FrameKind::Feedback => client.deliver_feedback(respond.frame),
+            FrameKind::Answer(service) => {
+                if let Some(tap) = &mut self.tap {
+                    tap(Tapped::Answered {
+                        to: respond.connection,
+                        service,
+                        frame: &respond.frame,
+                    });
+                }
+                client.respond(respond.frame, Some(service));
+            }
+        }
+    }
+}
+
+impl Client {
+    /// Sends a status, a forwarded call or another client's response.
+    pub(super) fn send(&self, frame: Bytes) {
+        self.respond(frame, None);
+    }
+
+    /// Sends a response. `service` is the responding service, if it is the runtime's own.
+    pub(super) fn respond(&self, frame: Bytes, service: Option<Service>) {
+        if frame.len() <= SHORT {
+            self.outlets
+                .backlog
+                .fetch_add(frame.len(), Ordering::Relaxed);
+        }
+        let response = ToClient::Respond { frame, service };
+        self.outlets.mailbox.do_send(response);
+    }
+
+    /// Sends feedback of a goal. It may be dropped.
+    pub(super) fn deliver_feedback(&self, frame: Bytes) {
+        let topic = None;
+        self.outlets
+            .mailbox
+            .do_send(ToClient::Deliver { topic, frame });
+    }
+
+    /// Bytes of responses that wait to be written to it.
+    pub(super) fn backlog(&self) -> usize {
+        self.outlets.backlog.load(Ordering::Relaxed)
+    }
+
+    /// Whether its short responses wait beyond the limit. Then other clients' calls and answers to it are refused.
+    pub(super) fn is_congested(&self) -> bool {
+        self.backlog() > MAX_BACKLOG
+    }
+}
+
+impl Registry {
+    /// Answers a frame that has no op: by the response of its call, by the result of its goal, or by a status.
+    pub(super) fn answer_error(&self, origin: &FrameOrigin, why: &OpError) {
+        match why {
+            OpError::Call { service, problem } => self.refuse_call(origin, service, problem, None),
+            OpError::Goal { action, problem } => {
+                self.end_goal(origin, action, problem, GoalStatus::Unknown);
+            }
+            OpError::Status(problem) => self.refuse(origin, problem),
+        }
+    }
+
+    /// Sends an error status with the reason to the sender of a refused frame.
+    pub(super) fn refuse(&self, origin: &FrameOrigin, why: &impl Display) {
+        let why = why.to_string();
+        tracing::debug!(connection = origin.from.0, why, "refused");
+        self.send_status(origin, Level::Error, &why);
+    }
+
+    pub(super) fn send_status(&self, origin: &FrameOrigin, level: Level, msg: &str) {
+        if let Some(client) = self.clients.get(&origin.from)
+            && client.verbosity.wants(level)
+        {
+            client.send(self.covered(messages::status(level, msg, origin.id.as_ref())));
+        }
+    }
+
+    /// The frame with the memory permit of the long frame from which it was made.
+    fn covered(&self, frame: Bytes) -> Bytes {
+        cover(self.permit.as_ref(), frame)
     }
 }
 

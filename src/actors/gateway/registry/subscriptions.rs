@@ -5,11 +5,13 @@
 
 use std::sync::Arc;
 
+use actix::prelude::*;
+
 use super::{FrameOrigin, Registry, Subscriber, ToClient};
 use crate::actors::ConnectionId;
 use crate::actors::graph::refusal::{self, Refusal};
-use crate::actors::graph::topics::Subscription;
-use crate::actors::node::Interest;
+use crate::actors::graph::subscribers::Subscription;
+use crate::actors::node::{Interest, SetTap, Tapped};
 use crate::protocol::catalog::Topic;
 use crate::protocol::catalog::types;
 use crate::protocol::messages::Level;
@@ -180,6 +182,26 @@ impl Registry {
         }
         if !self.is_wanted(&name) {
             self.note_unwanted(&name);
+        }
+    }
+}
+
+impl Handler<SetTap> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, SetTap(tap): SetTap, _: &mut Context<Self>) {
+        let was_set = self.tap.is_some();
+        self.tap = tap;
+        for topic in Topic::ALL {
+            if self.topics.subscribers(topic.name()).is_empty() {
+                match (was_set, self.tap.is_some()) {
+                    (_, true) => self.notify_owner(topic.name(), true),
+                    (true, false) => self.note_unwanted(topic.name()),
+                    (false, false) => {}
+                }
+            } else if let (Some(frame), Some(tap)) = (self.latched.get(&topic), &mut self.tap) {
+                tap(Tapped::Published(topic, frame));
+            }
         }
     }
 }
