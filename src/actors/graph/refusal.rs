@@ -63,11 +63,12 @@ pub(in crate::actors) enum Refusal {
     Closed(&'static str),
 }
 
-/// Refuses to publish on topics that only the runtime may publish.
-pub(in crate::actors) fn check_published(topic: &str) -> Result<(), Refusal> {
+/// Refuses to publish on topics that only the runtime may publish. Returns the topic of that name to which the runtime
+/// subscribes, if there is one.
+pub(in crate::actors) fn check_published(topic: &str) -> Result<Option<Topic>, Refusal> {
     match Topic::from_name(topic) {
         Some(own) if !own.is_subscribed() => Err(Refusal::RuntimeTopic(topic.to_owned())),
-        _ => Ok(()),
+        own => Ok(own),
     }
 }
 

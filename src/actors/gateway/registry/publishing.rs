@@ -17,7 +17,6 @@ use crate::actors::graph::forms::ToEncode;
 use crate::actors::graph::refusal;
 use crate::actors::node::{Publish, Tapped, TopicMessage, guard};
 use crate::actors::resources::memory::cover_message;
-use crate::protocol::catalog::Topic;
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::messages;
 use crate::protocol::names;
@@ -33,16 +32,19 @@ impl Registry {
         msg: Payload,
         ctx: &mut Context<Self>,
     ) -> Handled {
-        if let Err(why) = refusal::check_published(topic) {
-            self.refuse(&origin, &why);
-            return Handled::at_once();
-        }
+        let own = match refusal::check_published(topic) {
+            Ok(own) => own,
+            Err(why) => {
+                self.refuse(&origin, &why);
+                return Handled::at_once();
+            }
+        };
         let topic = &*names::absolute(topic);
         let Some(client) = self.clients.get(&origin.from) else {
             return Handled::at_once();
         };
-        let node = Topic::from_name(topic)
-            .filter(|topic| topic.is_subscribed() && !client.withdrawn.contains(topic))
+        let node = own
+            .filter(|topic| !client.withdrawn.contains(topic))
             .and_then(|topic| Some((topic, self.nodes.subscribers.get(&topic)?)));
         if node.is_none() && !client.registered.advertised.contains_key(topic) {
             return Handled::at_once();

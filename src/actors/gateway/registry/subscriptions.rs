@@ -27,7 +27,7 @@ impl Registry {
         topic: &str,
         type_name: Option<&str>,
     ) -> Result<(), Refusal> {
-        refusal::check_published(topic)?;
+        let own = refusal::check_published(topic)?;
         let topic = &*names::absolute(topic);
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
@@ -42,8 +42,8 @@ impl Registry {
             self.topics.note_type(topic, type_name);
         }
         client.registered.advertised.insert(topic.into(), entry);
-        if let Some(topic) = Topic::from_name(topic) {
-            client.withdrawn.remove(&topic);
+        if let Some(own) = own {
+            client.withdrawn.remove(&own);
         }
         Ok(())
     }
