@@ -9,10 +9,10 @@ use actix::prelude::*;
 use bytes::Bytes;
 
 use super::publishing::deliver;
-use super::{Registry, Subscriber};
+use super::{Handled, Registry, Subscriber};
 use crate::actors::ConnectionId;
 use crate::actors::graph::forms::{Made, ToEncode};
-use crate::actors::node::Done;
+use crate::actors::node::{Done, guard};
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages;
@@ -30,6 +30,16 @@ impl Registry {
             fragmented: Arc::clone(&self.fragmented),
             permit: self.permit.clone(),
         }
+    }
+
+    /// Ends the delivery of a client's message. The client waits for the encoding of a long one.
+    pub(super) fn finish_delivery(&self, long: Vec<ToEncode>, ctx: &mut Context<Self>) -> Handled {
+        if long.is_empty() {
+            return Handled::at_once();
+        }
+        let (done, ended) = guard();
+        self.encode_on_worker(long, &done, ctx);
+        Handled::with(ended)
     }
 
     /// Encodes long messages on worker threads, and delivers them.

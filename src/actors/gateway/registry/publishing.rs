@@ -119,16 +119,6 @@ impl Registry {
         }
         long
     }
-
-    /// Ends the delivery of a client's message. The client waits for the encoding of a long one.
-    fn finish_delivery(&self, long: Vec<ToEncode>, ctx: &mut Context<Self>) -> Handled {
-        if long.is_empty() {
-            return Handled::at_once();
-        }
-        let (done, ended) = guard();
-        self.encode_on_worker(long, &done, ctx);
-        Handled::with(ended)
-    }
 }
 
 impl Handler<Publish> for Registry {
