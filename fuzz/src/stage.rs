@@ -149,7 +149,7 @@ impl Stage {
         let (ours, theirs) = duplex(room);
         let (admission, local) = (Arc::clone(&self.admission), SocketAddr::from(LOCAL));
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
-        Connection::start_with(admission, local, theirs, registry, gauges);
+        Connection::start_with(None, admission, local, theirs, registry, gauges);
         ours
     }
 

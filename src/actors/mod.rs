@@ -37,5 +37,5 @@ pub mod runtime;
 pub mod start;
 
 /// Identifies one client connection during the life of the process. It is never reused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct ConnectionId(pub u64);

@@ -111,7 +111,7 @@ fn a_caller_that_has_stopped_sending_is_kept_until_its_socket_is_closed() {
         let (mut caller, theirs) = duplex(WIDE);
         let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
         let ends = Ends { local, peer };
-        Connection::start_with(Arc::default(), ends, theirs, registry, gauges);
+        Connection::start_with(None, Arc::default(), ends, theirs, registry, gauges);
         let call = format!("{}\n", call(1));
         caller.write_all(call.as_bytes()).await.unwrap();
         caller.shutdown().await.unwrap();

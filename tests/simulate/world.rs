@@ -90,7 +90,7 @@ impl World {
         };
         let local = SocketAddr::from(LOCAL);
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
-        Connection::start_with(Arc::default(), local, pipe, registry, gauges);
+        Connection::start_with(None, Arc::default(), local, pipe, registry, gauges);
         (ours, fate)
     }
 

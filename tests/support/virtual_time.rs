@@ -62,7 +62,7 @@ impl Gateway {
         let (ours, theirs) = duplex(room);
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
         let local = SocketAddr::from(([127, 0, 0, 1], 9095));
-        Connection::start_with(admission, local, theirs, registry, gauges);
+        Connection::start_with(None, admission, local, theirs, registry, gauges);
         ours
     }
 

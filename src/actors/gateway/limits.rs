@@ -76,5 +76,3 @@ pub(super) const DISCARD_TIME: Duration = Duration::from_secs(1);
 pub(super) const DISCARD_BYTES: usize = 16 * KIB * KIB;
 /// Delay after which expired pieces of a message are dropped. Also the interval of retries of a client without a place.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
-/// Interval of checks whether a client that has stopped sending, or is not read, has closed its socket.
-pub(super) const CLOSED_CHECK: Duration = Duration::from_millis(250);

@@ -6,6 +6,9 @@
 //! **Invariant:** once a query for a client's unread bytes fails, they are not queried again.
 
 use std::net::{Ipv4Addr, SocketAddr};
+use std::time::Duration;
+
+use tokio::time::sleep;
 
 #[cfg(target_os = "linux")]
 use self::sockets::value;
@@ -34,6 +37,8 @@ impl From<SocketAddr> for Ends {
     }
 }
 
+/// Interval of checks whether a client that has stopped sending, or is not read, has closed its socket.
+const CLOSED_CHECK: Duration = Duration::from_millis(250);
 /// Bytes of the header of a netlink message.
 const HEAD: usize = 16;
 /// The offsets of `idiag_rqueue`, `idiag_wqueue` and `idiag_inode` in `inet_diag_msg`.
@@ -60,11 +65,12 @@ fn unread(ends: Ends) -> Option<usize> {
     Some((received + value(ends.local, ends.peer, SENT)?) as usize)
 }
 
-/// Whether the client has closed its socket, if it is on this machine: the socket belongs to no program any more. A
+/// Ends when the client has closed its socket, if it is on this machine: the socket belongs to no program any more. A
 /// client that has only stopped sending may still read.
-#[must_use]
-pub fn has_closed(ends: Ends) -> bool {
-    value(ends.peer, ends.local, INODE) == Some(0)
+pub async fn closed(ends: Ends) {
+    while value(ends.peer, ends.local, INODE) != Some(0) {
+        sleep(CLOSED_CHECK).await;
+    }
 }
 
 #[cfg(target_os = "linux")]

@@ -21,15 +21,14 @@ use super::session::HeldPlace;
 use super::transport::{ClientLost, ClientStream, Transport};
 use crate::actors::compute::computations::Computations;
 use crate::actors::gateway::limits::{
-    LINGER, MAX_RESPONSES_WAITING, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES,
+    MAX_RESPONSES_WAITING, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES,
 };
 use crate::actors::gateway::registry::{Registry, Request, ToClient};
-use crate::actors::panics::{Contained, contain};
+use crate::actors::panics::contain;
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::turns::{Timer, end_turn};
 use crate::actors::resources::unread::Ends;
 use crate::protocol::catalog::Service;
-use crate::protocol::messages::{self, Level};
 use crate::protocol::outbox::Outbox;
 use crate::protocol::outbox::flow::{FlowControl, UnreadSource};
 
@@ -44,8 +43,8 @@ pub struct Connection<S> {
     pub(super) ends: Ends,
     pub(super) registry: Addr<Registry>,
     pub(super) gauges: Arc<Gauges>,
-    outbox: Outbox,
-    flow: FlowControl,
+    pub(super) outbox: Outbox,
+    pub(super) flow: FlowControl,
     /// Whether each write has only one frame. Old clients, which end their frames without a newline, treat the bytes of
     /// one read as one frame.
     pub(super) is_single: bool,
@@ -56,16 +55,16 @@ pub struct Connection<S> {
     /// Time when the frames being written left the outbox, or when the client last took bytes of them.
     pub(super) progress: Instant,
     /// Start of the time in which responses have waited without a break.
-    responses_since: Option<Instant>,
+    pub(super) responses_since: Option<Instant>,
     /// Its heavy calls.
-    computations: Computations<Request>,
+    pub(super) computations: Computations<Request>,
     /// Set when nothing more is read. Queued messages are still sent.
     pub(super) is_finishing: bool,
     /// Set if the client has no place, uses another protocol or violates a rule. It gets the reason, and its input is
     /// discarded.
     pub(super) is_refused: bool,
-    /// Set when the reader has ended.
-    pub(super) reader_has_ended: bool,
+    /// Set when the reader or the writer has ended.
+    pub(super) half_has_ended: bool,
 }
 
 impl<S: ClientStream> Connection<S> {
@@ -93,18 +92,13 @@ impl<S: ClientStream> Connection<S> {
             computations: Computations::default(),
             is_finishing: false,
             is_refused: false,
-            reader_has_ended: false,
+            half_has_ended: false,
         }
     }
 
     /// The transport of a client that is served.
     pub(super) fn transport(&mut self) -> Result<&mut Transport<S>, ClientLost> {
         self.transport.as_mut().ok_or(ClientLost::Gone)
-    }
-
-    /// Whether the client is served over WebSocket.
-    pub(super) fn is_socket(&self) -> bool {
-        self.transport.as_ref().is_some_and(Transport::is_socket)
     }
 
     // ---- into the outbox --------------------------------------------------------------------------------------------
@@ -139,21 +133,9 @@ impl<S: ClientStream> Connection<S> {
     }
 
     /// Adds a response or a status. Discards held-back messages on `superseded` topics, because they are older.
-    fn push_response(&mut self, frame: Bytes, superseded: &[&'static str]) {
+    pub(super) fn push_response(&mut self, frame: Bytes, superseded: &[&'static str]) {
         self.responses_since.get_or_insert_with(Instant::now);
         self.outbox.push_response(frame, superseded);
-    }
-
-    /// Refuses the client: it gets a status with the reason, and its further input is discarded.
-    pub(super) fn refuse(&mut self, why: &str) {
-        self.refuse_with(messages::status(Level::Error, why, None));
-    }
-
-    /// The same, for a reason that is already a status.
-    pub(super) fn refuse_with(&mut self, status: Bytes) {
-        self.is_refused = true;
-        self.backlog.fetch_add(status.len(), Ordering::Relaxed);
-        self.push_response(status, &[]);
     }
 
     // ---- out of the outbox ------------------------------------------------------------------------------------------
@@ -188,7 +170,7 @@ impl<S: ClientStream> Connection<S> {
 
     /// Notes that `bytes` of the frames were written. Returns whether that allows the client to be read again.
     fn note_written(&mut self, bytes: usize) -> bool {
-        let may_read = self.may_read();
+        let (may_read, may_compute) = (self.may_read(), self.may_compute());
         self.progress = Instant::now();
         self.flow.note_written(bytes, self.progress.into_std());
         let before = self.outbox.short_bytes();
@@ -200,36 +182,11 @@ impl<S: ClientStream> Connection<S> {
         if self.outbox.response_bytes() == 0 {
             self.responses_since = None;
         }
-        self.start_computation();
+        if !may_compute {
+            self.start_computation();
+        }
         !may_read && self.may_read()
     }
-
-    /// The earliest time of the next write, if nothing can be written now. Either a message is throttled, or the client
-    /// must read first.
-    fn next_release(&self) -> Option<Instant> {
-        let release = self.outbox.next_release();
-        let waits = self.outbox.has_topics() && !self.outbox.has_responses();
-        let query = self.flow.next_query().filter(|_| waits);
-        let first = release.into_iter().chain(query).min();
-        first.map(Instant::from_std)
-    }
-
-    /// Whether the client has read nothing for too long while a long message waits.
-    fn is_stuck(&self) -> bool {
-        self.flow.age() > STALL_LIMIT && self.outbox.has_long()
-    }
-
-    /// The deadline of a client that takes no byte of a write. `None` if no response or long message waits, unless it
-    /// is finishing.
-    fn stall_deadline(&self) -> Option<Instant> {
-        match self.responses_since {
-            Some(since) => Some(since.max(self.progress) + STALL_LIMIT),
-            None if self.is_finishing => Some(self.progress + LINGER),
-            None => self.outbox.has_long().then(|| self.progress + STALL_LIMIT),
-        }
-    }
-
-    // ---- computations: one runs, and others wait --------------------------------------------------------------------
 
     /// Whether the reader may go on: neither too many responses nor too many computations wait, or it is to end.
     pub(super) fn may_read(&self) -> bool {
@@ -237,35 +194,8 @@ impl<S: ClientStream> Connection<S> {
     }
 
     /// Whether another computation may start: not too many responses wait.
-    const fn may_compute(&self) -> bool {
+    pub(super) const fn may_compute(&self) -> bool {
         self.outbox.response_bytes() <= MAX_RESPONSES_WAITING
-    }
-
-    /// Queues a heavy call, whose frame had `length` bytes.
-    pub(super) fn enqueue_computation(&mut self, request: Request, length: usize) {
-        self.computations.push(request, length);
-        self.start_computation();
-    }
-
-    /// Starts the next computation if none runs and not too many responses wait.
-    fn start_computation(&mut self) {
-        if self.may_compute()
-            && let Some(request) = self.computations.start()
-        {
-            self.registry.do_send(request);
-        }
-    }
-
-    /// Whether a computation runs or waits.
-    pub(super) fn is_computing(&self) -> bool {
-        !self.computations.is_empty()
-    }
-
-    /// The client sends nothing more. Its output remains to be written, but it no longer waits for computations.
-    pub(super) fn leave(&mut self) {
-        self.computations = Computations::default();
-        self.gone.store(true, Ordering::Relaxed);
-        self.is_finishing = true;
     }
 }
 
@@ -289,61 +219,30 @@ impl<S: ClientStream> Handler<ToClient> for Connection<S> {
     }
 }
 
-impl<S: ClientStream> Connection<S> {
-    /// Ends the connection after a panic in `part` of it.
-    pub(super) fn fail(part: &str, panic: &Contained, ctx: &mut Context<Self>) {
-        tracing::error!(%panic, "a client's {part} failed; its connection ends");
-        ctx.stop();
-    }
-}
-
 // ---- the writer -----------------------------------------------------------------------------------------------------
 
 /// The writing half of a connection.
 #[derive(Default)]
 pub(super) struct ClientWriter {
-    timer: Timer,
+    pub(super) timer: Timer,
     /// Deadline of the end of the stream.
-    end_due: Option<Instant>,
-    /// Deadline of the reader, which continues after all messages were written.
-    reader_due: Option<Instant>,
+    pub(super) end_due: Option<Instant>,
 }
 
 impl<S: ClientStream> ActorFuture<Connection<S>> for ClientWriter {
-    type Output = ();
+    /// Whether all messages were written.
+    type Output = bool;
 
-    /// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
+    /// Writes the queued messages, until the connection has finished, its client is gone or has stalled for too long.
     fn poll(
-        self: Pin<&mut Self>,
+        mut self: Pin<&mut Self>,
         client: &mut Connection<S>,
         _: &mut Context<Connection<S>>,
-        cx: &mut task::Context<'_>,
-    ) -> Poll<()> {
-        let writer = self.get_mut();
-        if writer.reader_due.is_none() {
-            let is_all_written = ready!(writer.poll_write(client, cx));
-            if !is_all_written || !(client.is_refused || client.is_socket()) {
-                return Poll::Ready(());
-            }
-            writer.reader_due = Some(Instant::now() + LINGER);
-        }
-        if client.reader_has_ended {
-            return Poll::Ready(());
-        }
-        writer.timer.poll(writer.reader_due, cx)
-    }
-}
-
-impl ClientWriter {
-    /// Writes the queued messages. Ready at the end of the connection, with whether all of them were written.
-    fn poll_write<S: ClientStream>(
-        &mut self,
-        client: &mut Connection<S>,
         cx: &mut task::Context<'_>,
     ) -> Poll<bool> {
         let mut written = 0;
         loop {
-            let is_done = client.is_finishing && !client.is_computing();
+            let is_done = client.is_finishing && client.computations.is_empty();
             let has_frames = client.take_frames();
             let Some(transport) = &mut client.transport else {
                 return Poll::Ready(false);
@@ -370,7 +269,9 @@ impl ClientWriter {
                 return self.poll_end(client, cx);
             } else {
                 let is_gone = matches!(transport.poll_flush(cx), Poll::Ready(Err(_)));
-                if is_gone || client.is_stuck() {
+                // It has read nothing for too long while a long message waits.
+                let is_stuck = client.flow.age() > STALL_LIMIT && client.outbox.has_long();
+                if is_gone || is_stuck {
                     return Poll::Ready(false);
                 }
                 (None, client.next_release())
@@ -380,20 +281,5 @@ impl ClientWriter {
                 return Poll::Ready(false);
             }
         }
-    }
-
-    fn poll_end<S: ClientStream>(
-        &mut self,
-        client: &mut Connection<S>,
-        cx: &mut task::Context<'_>,
-    ) -> Poll<bool> {
-        let is_refused = client.is_refused;
-        if let Some(transport) = &mut client.transport
-            && let Poll::Ready(ended) = transport.poll_end(cx, is_refused)
-        {
-            return Poll::Ready(ended.is_ok());
-        }
-        let due = *self.end_due.get_or_insert_with(|| Instant::now() + LINGER);
-        self.timer.poll(Some(due), cx).map(|()| false)
     }
 }

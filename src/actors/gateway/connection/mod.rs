@@ -10,6 +10,7 @@
 
 pub mod admission;
 mod client;
+mod deadlines;
 #[cfg(feature = "web")]
 mod http;
 mod reader;
@@ -19,8 +20,10 @@ mod session;
     allow(dead_code, reason = "only an HTTP request opens a WebSocket")
 )]
 mod transport;
+mod websocket;
 
 use std::future::ready;
+use std::mem::replace;
 use std::pin::Pin;
 use std::sync::Arc;
 
@@ -30,12 +33,13 @@ use actix::prelude::*;
 use self::admission::Admission;
 use self::client::ClientWriter;
 pub use self::client::Connection;
-use self::reader::{ClientReader, Discarder};
+use self::deadlines::Discarder;
+use self::reader::ClientReader;
 use self::session::{ClientSession, Opened};
 pub use self::transport::ClientStream;
-use super::limits::DISCARD_TIME;
+use super::limits::{DISCARD_TIME, LINGER};
 use super::registry::{Outlets, Registry};
-use crate::actors::panics::contained;
+use crate::actors::panics::{Contained, contained};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::unread;
 pub use crate::actors::resources::unread::Ends;
@@ -44,11 +48,13 @@ use crate::protocol::outbox::flow::UnreadSource;
 impl<S: ClientStream> Connection<S> {
     /// Starts the actor for `stream` in the current system. It requires no token.
     pub fn start_on(stream: S, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Addr<Self> {
-        Self::start_with(Arc::default(), Ends::default(), stream, registry, gauges)
+        let (admission, ends) = (Arc::default(), Ends::default());
+        Self::start_with(None, admission, ends, stream, registry, gauges)
     }
 
-    /// Starts the actor for a client that must be admitted.
+    /// Starts the actor for a client that must be admitted. `unread` returns its unread bytes instead of the system.
     pub fn start_with(
+        unread: Option<UnreadSource>,
         admission: Arc<Admission>,
         ends: impl Into<Ends>,
         stream: S,
@@ -56,19 +62,7 @@ impl<S: ClientStream> Connection<S> {
         gauges: Arc<Gauges>,
     ) -> Addr<Self> {
         let ends = ends.into();
-        let unread = Box::new(unread::source(ends));
-        Self::start_reading(unread, admission, ends, stream, registry, gauges)
-    }
-
-    /// Starts the actor for a client whose unread bytes `unread` returns.
-    pub fn start_reading(
-        unread: UnreadSource,
-        admission: Arc<Admission>,
-        ends: Ends,
-        stream: S,
-        registry: Addr<Registry>,
-        gauges: Arc<Gauges>,
-    ) -> Addr<Self> {
+        let unread = unread.unwrap_or_else(|| Box::new(unread::source(ends)));
         Self::create(|ctx| {
             let connection = Self::new(ends, unread, registry, gauges);
             let outlets = Outlets {
@@ -103,16 +97,32 @@ impl<S: ClientStream> Connection<S> {
             }
             Err(status) => {
                 self.refuse_with(status);
-                self.is_finishing = true;
                 Box::pin(wrap_future(ready(())))
             }
         };
         let reading = reading
-            .then(|(), _, _| ActorFutureExt::<Self>::timeout(Discarder::default(), DISCARD_TIME))
-            .map(|_, connection, _| connection.reader_has_ended = true);
+            .then(|(), connection: &mut Self, _| {
+                connection.leave();
+                ActorFutureExt::<Self>::timeout(Discarder::default(), DISCARD_TIME)
+            })
+            .map(|_, connection, ctx| connection.end_half(ctx));
         Self::run("reader", reading, ctx);
-        let writing = ClientWriter::default().map(|(), _: &mut Self, ctx| ctx.stop());
+        let writing = ClientWriter::default().map(|is_all_written, connection: &mut Self, ctx| {
+            if is_all_written && (connection.is_refused || connection.is_socket()) {
+                ctx.run_later(LINGER, |_, ctx| ctx.stop());
+                connection.end_half(ctx);
+            } else {
+                ctx.stop();
+            }
+        });
         Self::run("writer", writing, ctx);
+    }
+
+    /// Ends the connection if the reader and the writer have ended.
+    fn end_half(&mut self, ctx: &mut Context<Self>) {
+        if replace(&mut self.half_has_ended, true) {
+            ctx.stop();
+        }
     }
 
     /// Runs a part of the connection. A panic ends only this connection.
@@ -126,5 +136,11 @@ impl<S: ClientStream> Connection<S> {
                 Self::fail(part, &panic, ctx);
             }
         }));
+    }
+
+    /// Ends the connection after a panic in `part` of it.
+    fn fail(part: &str, panic: &Contained, ctx: &mut Context<Self>) {
+        tracing::error!(%panic, "a client's {part} failed; its connection ends");
+        ctx.stop();
     }
 }

@@ -1,11 +1,10 @@
-//! The transport of a client's frames: plain bytes, or a WebSocket around them. Pings and closes of a WebSocket are
-//! answered. TCP keepalive detects a peer whose machine is gone, for both.
+//! The transport of a client's frames: plain bytes, or a [WebSocket](super::websocket) around them. TCP keepalive detects
+//! a peer whose machine is gone, for both.
 //!
 //! **Invariant:** the reader gets frames, and the writer passes whole frames that end in a newline, for both
-//! transports. At most one write and one pong of a WebSocket wait to be written.
+//! transports.
 
 use std::io::{self, IoSlice};
-use std::iter::once;
 use std::ops::Deref;
 use std::pin::{Pin, pin};
 use std::task::{Context, Poll, ready};
@@ -13,7 +12,7 @@ use std::task::{Context, Poll, ready};
 use bytes::{BufMut, Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
 
-use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, READ_BYTES, WRITE_BYTES, WRITE_FRAMES};
+use crate::actors::gateway::limits::{READ_BYTES, WRITE_BYTES, WRITE_FRAMES};
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::wire::frame::{FrameError, FramePart, FrameReader};
 use crate::protocol::wire::websocket::{SocketEnd, WebSocket};
@@ -34,11 +33,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> ClientStream for S {}
 
 /// The stream of a served client, and its protocol.
 pub(super) struct Transport<S> {
-    stream: S,
-    protocol: Protocol,
+    pub(super) stream: S,
+    pub(super) protocol: Protocol,
 }
 
-enum Protocol {
+pub(super) enum Protocol {
     Plain(FrameReader),
     WebSocket(Box<WebSocket>, Web),
 }
@@ -46,9 +45,9 @@ enum Protocol {
 /// Only an HTTP request opens a WebSocket. In a program without HTTP this has no value, so the compiler omits the code of
 /// the protocol.
 #[cfg(feature = "web")]
-struct Web;
+pub(super) struct Web;
 #[cfg(not(feature = "web"))]
-enum Web {}
+pub(super) enum Web {}
 
 impl<S: ClientStream> Transport<S> {
     /// A stream of lines.
@@ -62,11 +61,6 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn socket(stream: S) -> Self {
         let protocol = Protocol::WebSocket(Box::default(), Web);
         Self { stream, protocol }
-    }
-
-    /// Whether its frames are messages, which may be binary. The peer then answers the end of the connection.
-    pub(super) const fn is_socket(&self) -> bool {
-        matches!(self.protocol, Protocol::WebSocket(..))
     }
 
     // ---- receiving --------------------------------------------------------------------------------------------------
@@ -103,28 +97,8 @@ impl<S: ClientStream> Transport<S> {
             Protocol::Plain(frames) => Ok(frames.cut()),
             Protocol::WebSocket(socket, _) => match socket.incoming.cut() {
                 Some(part) => Ok(Some(part)),
-                None => check_end(socket).map(|()| None),
+                None => Self::check_end(socket).map(|()| None),
             },
-        }
-    }
-
-    /// Reads pings and a close in `chunk`, which follow messages that wait. Returns an error if the client has ended.
-    /// Lines stay in `chunk`.
-    pub(super) fn look_ahead(&mut self, chunk: &mut BytesMut) -> Result<(), ClientLost> {
-        let Protocol::WebSocket(socket, _) = &mut self.protocol else {
-            return Ok(());
-        };
-        socket.incoming.push(chunk);
-        chunk.clear();
-        socket.incoming.look_ahead(FRAMES_IN_A_ROW);
-        check_end(socket)
-    }
-
-    /// Bytes that [`look_ahead`](Self::look_ahead) has taken.
-    pub(super) fn taken_ahead(&self) -> usize {
-        match &self.protocol {
-            Protocol::Plain(_) => 0,
-            Protocol::WebSocket(socket, _) => socket.incoming.waiting(),
         }
     }
 
@@ -153,17 +127,6 @@ impl<S: ClientStream> Transport<S> {
         }
     }
 
-    /// Abandons a frame that takes too long. Returns an error if the transport itself sends `why` to the client.
-    pub(super) fn give_up(&mut self, why: &'static str) -> Result<(), ClientLost> {
-        match &mut self.protocol {
-            Protocol::Plain(_) => Ok(()),
-            Protocol::WebSocket(socket, _) => {
-                socket.outgoing.refuse(why);
-                Err(ClientLost::Refused)
-            }
-        }
-    }
-
     // ---- sending ----------------------------------------------------------------------------------------------------
 
     /// Sends some of `frames`, in order. Returns the number of bytes. The next call begins with the rest of a frame. Over
@@ -176,7 +139,7 @@ impl<S: ClientStream> Transport<S> {
         let stream = &mut self.stream;
         match &mut self.protocol {
             Protocol::Plain(_) => write_some(stream, cx, frames),
-            Protocol::WebSocket(socket, _) => poll_messages(socket, stream, cx, frames),
+            Protocol::WebSocket(socket, _) => Self::poll_messages(socket, stream, cx, frames),
         }
     }
 
@@ -184,24 +147,8 @@ impl<S: ClientStream> Transport<S> {
     pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         match &mut self.protocol {
             Protocol::Plain(_) => Poll::Ready(Ok(())),
-            Protocol::WebSocket(socket, _) => poll_output(socket, &mut self.stream, cx),
+            Protocol::WebSocket(socket, _) => Self::poll_output(socket, &mut self.stream, cx),
         }
-    }
-
-    /// Closes the stream in an orderly way. The input of a refused peer is discarded, including its close frame. The end
-    /// of the stream is enough for it.
-    pub(super) fn poll_end(
-        &mut self,
-        cx: &mut Context<'_>,
-        is_refused: bool,
-    ) -> Poll<io::Result<()>> {
-        if let Protocol::WebSocket(socket, _) = &mut self.protocol {
-            ready!(poll_close(socket, &mut self.stream, cx))?;
-            if !is_refused {
-                return Poll::Ready(Ok(()));
-            }
-        }
-        Pin::new(&mut self.stream).poll_shutdown(cx)
     }
 }
 
@@ -217,7 +164,7 @@ pub(super) async fn read_some<S: AsyncRead + Unpin>(
 }
 
 /// Writes some of `frames`, in order. Returns the number of bytes.
-fn write_some<'a, S: AsyncWrite + Unpin, B: Deref<Target = [u8]> + 'a>(
+pub(super) fn write_some<'a, S: AsyncWrite + Unpin, B: Deref<Target = [u8]> + 'a>(
     stream: &mut S,
     cx: &mut Context<'_>,
     mut frames: impl ExactSizeIterator<Item = &'a B>,
@@ -247,59 +194,4 @@ fn write_some<'a, S: AsyncWrite + Unpin, B: Deref<Target = [u8]> + 'a>(
         0 => Err(io::ErrorKind::WriteZero.into()),
         written => Ok(written),
     })
-}
-
-// ---- a WebSocket: a message is a frame ------------------------------------------------------------------------------
-
-/// An error if the peer has ended the stream.
-fn check_end(socket: &mut WebSocket) -> Result<(), ClientLost> {
-    match socket.end() {
-        None => Ok(()),
-        Some(SocketEnd::Closed(_)) => Err(ClientLost::Gone),
-        Some(SocketEnd::Violated) => Err(ClientLost::Refused),
-    }
-}
-
-/// Sends a part of `frames`. Returns their number of bytes, once that part is sent. A peer that has closed gets only a
-/// close frame.
-fn poll_messages<'a, S: ClientStream>(
-    socket: &mut WebSocket,
-    stream: &mut S,
-    cx: &mut Context<'_>,
-    frames: impl ExactSizeIterator<Item = &'a Bytes>,
-) -> Poll<io::Result<usize>> {
-    if let Some(SocketEnd::Closed(_)) = socket.incoming.end() {
-        ready!(poll_close(socket, stream, cx))?;
-        return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
-    }
-    if !socket.outgoing.has_messages() {
-        ready!(poll_output(socket, stream, cx))?;
-        socket.outgoing.put(frames);
-    }
-    let sent = ready!(write_some(stream, cx, once(socket.outgoing.output())))?;
-    Poll::Ready(Ok(socket.outgoing.sent(sent)))
-}
-
-/// Sends the output, and the answer to the latest ping.
-fn poll_output<S: ClientStream>(
-    socket: &mut WebSocket,
-    stream: &mut S,
-    cx: &mut Context<'_>,
-) -> Poll<io::Result<()>> {
-    while let Some(output) = socket.output() {
-        let sent = ready!(write_some(stream, cx, once(output)))?;
-        socket.outgoing.sent(sent);
-    }
-    Poll::Ready(Ok(()))
-}
-
-/// Sends the close frame.
-fn poll_close<S: ClientStream>(
-    socket: &mut WebSocket,
-    stream: &mut S,
-    cx: &mut Context<'_>,
-) -> Poll<io::Result<()>> {
-    ready!(poll_output(socket, stream, cx))?;
-    socket.outgoing.put_close();
-    poll_output(socket, stream, cx)
 }

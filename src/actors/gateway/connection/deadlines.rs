@@ -1,0 +1,195 @@
+//! A client that is slow, stops or is refused: the waits for it, and their deadlines.
+//!
+//! **Invariant:** the waits for the rest of a frame, for a client that reads nothing, and for the end of its stream have
+//! deadlines.
+
+use std::pin::Pin;
+use std::sync::atomic::Ordering;
+use std::task::{self, Poll, ready};
+
+use actix::prelude::*;
+use bytes::{Bytes, BytesMut};
+use tokio::time::Instant;
+
+use super::client::{ClientWriter, Connection};
+use super::reader::{ClientReader, ReadStep};
+use super::transport::{ClientLost, ClientStream};
+use crate::actors::compute::computations::Computations;
+use crate::actors::gateway::limits::{
+    DISCARD_BYTES, FRAME_TIME, LINGER, LOOK_AGAIN, READ_BYTES, RESPONSES_TIME, STALL_LIMIT,
+};
+use crate::actors::resources::turns::end_turn;
+use crate::actors::resources::unread::closed;
+use crate::protocol::messages::{self, Level};
+use crate::protocol::wire::fragments::MAX_AGE;
+
+/// The error for a frame that takes longer than [`FRAME_TIME`].
+const TOO_SLOW: &str = "a frame that has begun must be complete within a minute";
+
+impl ClientReader {
+    /// Waits for the memory permit of the incoming long frame.
+    pub(super) fn wait_for_room<S>(&mut self, client: &Connection<S>) -> ReadStep {
+        self.frame_due = None;
+        let (memory, ends) = (client.gauges.memory().clone(), client.ends);
+        // The end of the stream comes after bytes that are not read without a permit.
+        ReadStep::WaitingForRoom(Box::pin(async move {
+            tokio::select! {
+                biased;
+                permit = memory.long_frame() => Ok(permit),
+                () = closed(ends) => Err(ClientLost::Gone),
+            }
+        }))
+    }
+
+    /// Refuses the client if an incomplete frame takes too long. Meanwhile drops expired pieces of messages.
+    pub(super) fn poll_deadlines<S: ClientStream>(
+        &mut self,
+        client: &mut Connection<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<Result<(), ClientLost>> {
+        let transport = client.transport()?;
+        loop {
+            let begin = || Instant::now() + FRAME_TIME;
+            let is_unfinished = transport.is_unfinished();
+            let late = is_unfinished.then(|| *self.frame_due.get_or_insert_with(begin));
+            let began = self.long.fragments.began().map(Instant::from_std);
+            let old = began.map(|began| began + MAX_AGE + LOOK_AGAIN);
+            ready!(self.timer.poll(late.into_iter().chain(old).min(), cx));
+            let now = Instant::now();
+            if late.is_some_and(|late| late <= now) {
+                transport.give_up(TOO_SLOW)?;
+                client.refuse(TOO_SLOW);
+                return Poll::Ready(Ok(()));
+            }
+            self.long.fragments.forget_old(now.into_std());
+            self.long.give_back(transport.is_long_coming());
+        }
+    }
+
+    /// Waits until enough was written and computed that the client may be read. Meanwhile reads up to [`READ_BYTES`]
+    /// bytes, to detect the end of the stream. Returns an error if the client has disconnected. A client that has ended
+    /// its stream counts as disconnected if nothing was written for [`RESPONSES_TIME`].
+    pub(super) fn poll_blocked<S: ClientStream>(
+        &mut self,
+        client: &mut Connection<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<Result<(), ClientLost>> {
+        while !client.may_read() {
+            self.frame_due = None;
+            if self.has_ended {
+                let begin = || (Instant::now(), Box::pin(closed(client.ends)) as _);
+                let (since, closed) = self.blocked.get_or_insert_with(begin);
+                let due = client.progress.max(*since) + RESPONSES_TIME;
+                if closed.as_mut().poll(cx).is_pending() {
+                    ready!(self.timer.poll(Some(due), cx));
+                }
+                return Poll::Ready(Err(ClientLost::Gone));
+            }
+            let transport = client.transport()?;
+            if self.chunk.len() + transport.taken_ahead() >= READ_BYTES {
+                return Poll::Pending;
+            }
+            self.has_ended = ready!(transport.poll_read(cx, &mut self.chunk))? == 0;
+            transport.look_ahead(&mut self.chunk)?;
+        }
+        self.blocked = None;
+        Poll::Ready(Ok(()))
+    }
+}
+
+impl<S: ClientStream> Connection<S> {
+    /// The deadline of a client that takes no byte of a write. `None` if no response or long message waits, unless it
+    /// is finishing.
+    pub(super) fn stall_deadline(&self) -> Option<Instant> {
+        match self.responses_since {
+            Some(since) => Some(since.max(self.progress) + STALL_LIMIT),
+            None if self.is_finishing => Some(self.progress + LINGER),
+            None => self.outbox.has_long().then(|| self.progress + STALL_LIMIT),
+        }
+    }
+
+    /// The earliest time of the next write, if nothing can be written now. Either a message is throttled, or the client
+    /// must read first.
+    pub(super) fn next_release(&self) -> Option<Instant> {
+        let release = self.outbox.next_release();
+        let waits = self.outbox.has_topics() && !self.outbox.has_responses();
+        let query = self.flow.next_query().filter(|_| waits);
+        let first = release.into_iter().chain(query).min();
+        first.map(Instant::from_std)
+    }
+
+    /// Starts the next computation if none runs and not too many responses wait.
+    pub(super) fn start_computation(&mut self) {
+        if self.may_compute()
+            && let Some(request) = self.computations.start()
+        {
+            self.registry.do_send(request);
+        }
+    }
+
+    /// Refuses the client: it gets a status with the reason, and its further input is discarded.
+    pub(super) fn refuse(&mut self, why: &str) {
+        self.refuse_with(messages::status(Level::Error, why, None));
+    }
+
+    /// The same, for a reason that is already a status.
+    pub(super) fn refuse_with(&mut self, status: Bytes) {
+        self.is_refused = true;
+        self.backlog.fetch_add(status.len(), Ordering::Relaxed);
+        self.push_response(status, &[]);
+    }
+
+    /// The client sends nothing more. Its output remains to be written, but it no longer waits for computations.
+    pub(super) fn leave(&mut self) {
+        self.computations = Computations::default();
+        self.gone.store(true, Ordering::Relaxed);
+        self.is_finishing = true;
+    }
+}
+
+// ---- the end --------------------------------------------------------------------------------------------------------
+
+/// Reads and discards the input of a client, up to a limit, if it is refused.
+#[derive(Default)]
+pub(super) struct Discarder {
+    bytes: usize,
+}
+
+impl<S: ClientStream> ActorFuture<Connection<S>> for Discarder {
+    type Output = ();
+
+    fn poll(
+        mut self: Pin<&mut Self>,
+        client: &mut Connection<S>,
+        _: &mut Context<Connection<S>>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<()> {
+        let Some(transport) = client.transport.as_mut().filter(|_| client.is_refused) else {
+            return Poll::Ready(());
+        };
+        let read = ready!(transport.poll_read(cx, &mut BytesMut::new()));
+        self.bytes += read.unwrap_or(0);
+        if read.unwrap_or(0) == 0 || self.bytes >= DISCARD_BYTES {
+            return Poll::Ready(());
+        }
+        end_turn(cx)
+    }
+}
+
+impl ClientWriter {
+    /// Ends the stream after the last message.
+    pub(super) fn poll_end<S: ClientStream>(
+        &mut self,
+        client: &mut Connection<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<bool> {
+        let is_refused = client.is_refused;
+        if let Some(transport) = &mut client.transport
+            && let Poll::Ready(ended) = transport.poll_end(cx, is_refused)
+        {
+            return Poll::Ready(ended.is_ok());
+        }
+        let due = *self.end_due.get_or_insert_with(|| Instant::now() + LINGER);
+        self.timer.poll(Some(due), cx).map(|()| false)
+    }
+}
