@@ -21,7 +21,7 @@ pub use self::telemetry::{
     Stamp,
 };
 use crate::protocol::wire::json::Payload;
-use crate::protocol::wire::series;
+use crate::protocol::wire::lines;
 
 /// Initial capacity of a frame. The state of a 3-link arm and every status fit.
 const USUAL_FRAME: usize = 512;
@@ -44,7 +44,7 @@ pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
         .end()
 }
 
-/// A frame of [`publish`] for `topic`, or a [series] of them, rewritten for subscribers with another spelling of
+/// A frame of [`publish`] for `topic`, or a [series](lines) of them, rewritten for subscribers with another spelling of
 /// the name.
 #[must_use]
 pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
@@ -52,7 +52,7 @@ pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
         return frames.clone();
     }
     let mut text = Vec::with_capacity(frames.len());
-    for frame in series::messages(frames.clone()) {
+    for frame in lines::messages(frames.clone()) {
         let mut line = Encoder::after(text, "publish").value("topic", spelling);
         line.key("msg");
         line.text.extend_from_slice(message_text(topic, &frame));

@@ -10,7 +10,7 @@ use bytes::Bytes;
 use super::Outbox;
 use super::message::{QueuedMessage, counted};
 use crate::protocol::limits::MAX_FRAME;
-use crate::protocol::wire::series::{by_itself, first_message, first_messages, last_messages};
+use crate::protocol::wire::lines::{by_itself, first_message, first_messages, last_messages};
 
 /// Most bytes of topic messages that wait for one connection, each with [`MESSAGE_BYTES`]: ten seconds of the arm's
 /// own. A message longer than [`MEDIUM`](crate::protocol::limits::MEDIUM) uses the shared pool and counts as that many

@@ -12,7 +12,7 @@ use super::Outbox;
 use super::message::QueuedMessage;
 use super::throttle::Throttle;
 use crate::protocol::limits::MEDIUM;
-use crate::protocol::wire::series::{by_itself, first_message, last_messages, messages};
+use crate::protocol::wire::lines::{by_itself, first_message, last_messages, messages};
 
 impl Outbox {
     /// Sets the limits of a topic, or removes them after an unsubscription. Queued messages are still sent. If the

@@ -32,7 +32,7 @@ use self::message::{QueuedMessage, Waiting, counted};
 pub use self::throttle::Throttle;
 use self::throttle::TopicLimits;
 use crate::protocol::limits::{MEDIUM, SHORT};
-use crate::protocol::wire::series::first_message;
+use crate::protocol::wire::lines::first_message;
 
 /// The outgoing queue of one connection.
 #[derive(Debug, Default)]
