@@ -73,6 +73,33 @@ impl Outbox {
         }
     }
 
+    /// Drops the oldest messages of a topic with more waiting messages than the client's `queue_length`, while the
+    /// client is slow.
+    pub(super) fn keep_to_queue_length(&mut self, topic: &Arc<str>) {
+        if self.writing.is_empty() && self.room != Some(0) {
+            return;
+        }
+        let limits = self.limits.get(topic);
+        let Some(most) = limits.and_then(|limits| limits.throttle.queue_length) else {
+            return;
+        };
+        let waiting = self.topics.iter().filter(|message| message.is_on(topic));
+        let mut surplus = waiting.count().saturating_sub(most);
+        let (mut index, mut before) = (0, 0);
+        self.topics.retain(|message| {
+            let stays = surplus == 0 || !message.is_on(topic);
+            if !stays {
+                surplus -= 1;
+                self.waiting.forget(message);
+                self.dropped += message.count();
+                before += usize::from(index < self.kept_old);
+            }
+            index += 1;
+            stays
+        });
+        self.kept_old -= before;
+    }
+
     /// Whether any message is held back.
     #[must_use]
     pub fn holds_back(&self) -> bool {
