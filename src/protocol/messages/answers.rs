@@ -33,6 +33,15 @@ table! {
     }
 }
 
+impl Encoder {
+    fn optional<T: Serialize + ?Sized>(self, key: &str, value: Option<&T>) -> Self {
+        match value {
+            Some(value) => self.value(key, value),
+            None => self,
+        }
+    }
+}
+
 /// The answer to a service call. `values` is an object, and `status` is empty on success. `values` of another client
 /// are forwarded.
 #[must_use]

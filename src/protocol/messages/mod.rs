@@ -116,13 +116,6 @@ impl Encoder {
         self
     }
 
-    fn optional<T: Serialize + ?Sized>(self, key: &str, value: Option<&T>) -> Self {
-        match value {
-            Some(value) => self.value(key, value),
-            None => self,
-        }
-    }
-
     fn end(mut self) -> Bytes {
         self.text.extend_from_slice(b"}\n");
         // The frame may wait for long, and only its bytes are counted, so its spare capacity is freed.
