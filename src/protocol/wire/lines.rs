@@ -38,18 +38,11 @@ fn lines(bytes: &[u8]) -> usize {
 /// The last messages of a series, at most `count`.
 #[must_use]
 pub fn last_messages(mut frames: Bytes, count: usize) -> Bytes {
-    let mut start = frames.len();
-    for _ in 0..count {
-        // A message ends with its newline.
-        let before = frames.get(..start.saturating_sub(1)).unwrap_or_default();
-        start = before
-            .iter()
-            .rposition(|byte| *byte == b'\n')
-            .map_or(0, |end| end + 1);
-        if start == 0 {
-            break;
-        }
-    }
+    // Of the parts between line ends, the last one is empty.
+    let before = frames
+        .rsplitn(count + 2, |byte| *byte == b'\n')
+        .nth(count + 1);
+    let start = before.map_or(0, |before| before.len() + 1);
     frames.split_off(start)
 }
 
