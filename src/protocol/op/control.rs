@@ -9,9 +9,9 @@ use std::time::Duration;
 use serde_json::value::RawValue;
 
 use super::types::{
-    Compression, Encoding, MAX_QUEUE_LENGTH, MAX_THROTTLE, Served, Subscribe, Verbosity,
+    Compression, Encoding, MAX_QUEUE_LENGTH, MAX_THROTTLE, Served, Subscribe, Verbosity, duration,
 };
-use super::{Incoming, Members, Op, Problem, duration};
+use super::{Incoming, Members, Op, Problem};
 use crate::protocol::messages::{ErrorForm, Level};
 use crate::protocol::wire::fragments::Piece;
 use crate::protocol::wire::json::{self, Payload};

@@ -20,9 +20,11 @@ use std::time::Duration;
 use serde_json::value::RawValue;
 
 pub use self::problems::{OpError, Problem};
+pub use self::providers::read_start;
+use self::types::duration;
 pub use self::types::{
-    ActionGoal, Compression, Encoding, GoalStatus, MAX_QUEUE_LENGTH, MAX_THROTTLE, ProviderOp,
-    Served, Subscribe, Verbosity,
+    ActionGoal, Compression, Encoding, GoalStatus, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT,
+    ProviderOp, Served, Subscribe, Verbosity,
 };
 use super::messages::ErrorForm;
 pub use crate::protocol::limits::MAX_NAME;
@@ -118,9 +120,6 @@ pub enum Op {
     },
 }
 
-/// Longest `timeout` of a forwarded call: a day.
-pub const MAX_TIMEOUT: Duration = Duration::from_secs(24 * 3600);
-
 /// The arguments of a call: fields by name, or in documented order in an array; `{}` if they are absent or `null`. The
 /// node that serves the call refuses any other value, because some services echo their values even then.
 pub type Arguments = Payload;
@@ -197,7 +196,7 @@ const A_NAME: &str = "a non-empty string";
 pub fn read_raw(frame: RawFrame) -> Option<Incoming> {
     Some(match frame.decode()? {
         Ok(text) => read(&text),
-        Err((error, start)) => read_start(&start, &error),
+        Err((error, start)) => Members::of_start(&start).not_a_frame(&error),
     })
 }
 
@@ -217,15 +216,6 @@ pub fn read(frame: &str) -> Incoming {
         Err(problem) => Err(OpError::Status(problem)),
     };
     Incoming { id, op }
-}
-
-/// Reads the start of a frame that is refused for the reason `why`. It may be the answer to a call, which then fails.
-#[must_use]
-pub fn read_start(start: &[u8], why: &impl ToString) -> Incoming {
-    let text = start.utf8_chunks().next();
-    // The members before its end or its fault count.
-    let (members, _) = Members::of(text.map_or("", |one| one.valid()));
-    members.refused(Problem::NotAFrame(why.to_string()))
 }
 
 /// The members of one frame.
@@ -357,9 +347,4 @@ impl<'a> Members<'a> {
         };
         read.map_err(|problem| self.fault(kind, problem))
     }
-}
-
-/// A finite number of seconds as a duration of at most `longest`, which a negative number gives too.
-fn duration(seconds: f64, longest: Duration) -> Duration {
-    Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
 }
