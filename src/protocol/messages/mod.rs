@@ -14,7 +14,7 @@ use serde::Serialize;
 
 pub use self::answers::{
     Empty, ErrorForm, Level, action_feedback, action_goal, action_result, call, cancellation,
-    failure, response, status,
+    failure, publish, response, status,
 };
 pub use self::telemetry::{
     Clock, DiagnosticArray, DiagnosticStatus, ErrorEstimateMessage, Header, JointState, KeyValue,
@@ -25,15 +25,6 @@ use crate::protocol::wire::lines;
 
 /// Initial capacity of a frame. The state of a 3-link arm and every status fit.
 const USUAL_FRAME: usize = 512;
-
-/// A message on a topic.
-#[must_use]
-pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
-    Encoder::op("publish")
-        .value("topic", topic)
-        .value("msg", msg)
-        .end()
-}
 
 /// A forwarded message of a client; `msg` is valid JSON.
 #[must_use]
