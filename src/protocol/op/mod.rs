@@ -196,7 +196,7 @@ const A_NAME: &str = "a non-empty string";
 pub fn read_raw(frame: RawFrame) -> Option<Incoming> {
     Some(match frame.decode()? {
         Ok(text) => read(&text),
-        Err((error, start)) => Members::of_start(&start).not_a_frame(&error),
+        Err((error, start)) => Incoming::of_start(&start, &error),
     })
 }
 

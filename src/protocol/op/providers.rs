@@ -15,21 +15,19 @@ use crate::protocol::wire::json::{self, Payload};
 /// Reads the start of a frame that is refused for the reason `why`. It may be the answer to a call, which then fails.
 #[must_use]
 pub fn read_start(start: &[u8], why: &impl ToString) -> Incoming {
-    Members::of_start(start).not_a_frame(why)
+    Incoming::of_start(start, why)
 }
 
-impl<'a> Members<'a> {
-    /// The members in the start of a frame, before its end or its fault.
-    pub(super) fn of_start(start: &'a [u8]) -> Self {
+impl Incoming {
+    pub(super) fn of_start(start: &[u8], why: &impl ToString) -> Self {
         let text = start.utf8_chunks().next();
-        Self::of(text.map_or("", |one| one.valid())).0
+        // The members before its end or its fault count.
+        let (members, _) = Members::of(text.map_or("", |one| one.valid()));
+        members.refused(Problem::NotAFrame(why.to_string()))
     }
+}
 
-    /// A frame that is refused for the reason `why`.
-    pub(super) fn not_a_frame(self, why: &impl ToString) -> Incoming {
-        self.refused(Problem::NotAFrame(why.to_string()))
-    }
-
+impl Members<'_> {
     pub(super) fn goal(&self) -> Result<ActionGoal, Problem> {
         self.short("id", self.get("id").map_or("", RawValue::get))?;
         Ok(ActionGoal {
