@@ -1,5 +1,5 @@
-//! Reads goals, and the operations of clients that serve a service or an action. Frames with a fault, which may be
-//! answers.
+//! Reads goals, and the operations of clients that serve a service or an action. Also reads
+//! frames with a fault, because such a frame may be an answer.
 //!
 //! **Invariant:** an answer has the `id` of its call or goal. A bad answer names its call or goal, if it
 //! has an `id` or the name.

@@ -38,7 +38,7 @@ fn lines(bytes: &[u8]) -> usize {
 /// The last messages of a series, at most `count`.
 #[must_use]
 pub fn last_messages(mut frames: Bytes, count: usize) -> Bytes {
-    // Of the parts between line ends, the last one is empty.
+    // The part after the last line end is empty.
     let before = frames
         .rsplitn(count + 2, |byte| *byte == b'\n')
         .nth(count + 1);

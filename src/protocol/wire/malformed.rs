@@ -87,7 +87,7 @@ impl Iterator for FrameReader {
     }
 }
 
-/// Where the reader is after the scan of a reported object has stopped.
+/// The state after the scan of a reported object has stopped.
 const fn state_after(end: Option<&ObjectEnd>) -> ScanState {
     match end {
         None | Some(Err(FrameError::TooDeep)) => ScanState::SkippedObject,
