@@ -64,7 +64,7 @@ fn check<'a>(
 }
 
 fn compare(
-    outcome: Result<pendularm::protocol::wire::frame::Frame, FrameError>,
+    outcome: Result<pendularm::protocol::wire::Frame, FrameError>,
     wanted: &Outcome,
     limit: usize,
     stream: &[u8],

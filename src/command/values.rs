@@ -14,7 +14,7 @@ use yaml_rust2::{Yaml, YamlLoader};
 
 use super::output::{CommandError, Outcome};
 use crate::protocol::limits::MAX_NESTING;
-use crate::protocol::wire::json::string_end;
+use crate::protocol::wire::literals::string_end;
 use crate::protocol::wire::text::escape;
 
 /// Reads a value in JSON or YAML.

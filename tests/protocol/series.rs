@@ -6,7 +6,8 @@ use pendularm::protocol::limits::MAX_NAME;
 use pendularm::protocol::messages;
 use pendularm::protocol::op::{self, Op};
 use pendularm::protocol::wire::frame::FrameReader;
-use pendularm::protocol::wire::series::{MAX_SERIES, Series, first_message};
+use pendularm::protocol::wire::lines::first_message;
+use pendularm::protocol::wire::series::{MAX_SERIES, Series};
 use proptest::prelude::*;
 
 use crate::json::json_of;
@@ -137,11 +138,8 @@ fn a_series_is_bounded() {
         all.extend_from_slice(&series.frames);
     }
     assert_eq!(all, stream.into_bytes());
-    let long = line(
-        "/x",
-        &format!("{{\"data\":\"{}\"}}", "x".repeat(MAX_SERIES)),
-    );
-    assert_eq!(series(long.as_bytes()), None);
+    let long = format!("{{\"data\":\"{}\"}}", "x".repeat(MAX_SERIES));
+    assert_eq!(series(line("/x", &long).as_bytes()), None);
 }
 
 proptest! {

@@ -16,7 +16,7 @@ use crate::protocol::names::own_id;
 use crate::protocol::op::{Compression, Encoding};
 use crate::protocol::outbox::MAX_MESSAGE;
 use crate::protocol::ros::{cbor, stamps};
-use crate::protocol::wire::{fragments, series};
+use crate::protocol::wire::{fragments, lines};
 
 /// The messages in one form.
 #[derive(Default)]
@@ -60,7 +60,7 @@ impl ToEncode {
     /// Makes the form.
     pub fn make(&self) -> Made {
         let mut made = Made::default();
-        for message in series::messages(self.plain.clone()) {
+        for message in lines::messages(self.plain.clone()) {
             match self.encode(&message) {
                 Some(encoded) => {
                     let covered = cover_message(self.permit.as_ref(), encoded);
@@ -81,7 +81,7 @@ impl ToEncode {
             let size = encoding.fragment_size;
             let Some(size) = size.filter(|size| plain.len() > *size) else {
                 let is_part = message.len() < self.plain.len();
-                let unchanged = || series::by_itself(message.clone(), is_part);
+                let unchanged = || lines::by_itself(message.clone(), is_part);
                 return Some(renamed.unwrap_or_else(unchanged));
             };
             let number = self.fragmented.fetch_add(1, Ordering::Relaxed) + 1;

@@ -1,4 +1,4 @@
-//! The frames of answers and requests to one client: responses, goals and statuses.
+//! The frames that the runtime makes itself: messages of its nodes, responses, goals, statuses, and requests to clients.
 //!
 //! **Invariant:** an answer has the `id` of its request, as its [`Payload`] writes it.
 
@@ -31,6 +31,24 @@ table! {
         /// The text of `status`, as in `rosbridge_suite`. This is the default over WebSocket.
         Text = "text",
     }
+}
+
+impl Encoder {
+    fn optional<T: Serialize + ?Sized>(self, key: &str, value: Option<&T>) -> Self {
+        match value {
+            Some(value) => self.value(key, value),
+            None => self,
+        }
+    }
+}
+
+/// A message of a node on a topic.
+#[must_use]
+pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
+    Encoder::op("publish")
+        .value("topic", topic)
+        .value("msg", msg)
+        .end()
 }
 
 /// The answer to a service call. `values` is an object, and `status` is empty on success. `values` of another client

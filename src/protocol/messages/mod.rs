@@ -14,26 +14,17 @@ use serde::Serialize;
 
 pub use self::answers::{
     Empty, ErrorForm, Level, action_feedback, action_goal, action_result, call, cancellation,
-    failure, response, status,
+    failure, publish, response, status,
 };
 pub use self::telemetry::{
     Clock, DiagnosticArray, DiagnosticStatus, ErrorEstimateMessage, Header, JointState, KeyValue,
     Stamp,
 };
 use crate::protocol::wire::json::Payload;
-use crate::protocol::wire::series;
+use crate::protocol::wire::lines;
 
 /// Initial capacity of a frame. The state of a 3-link arm and every status fit.
 const USUAL_FRAME: usize = 512;
-
-/// A message on a topic.
-#[must_use]
-pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
-    Encoder::op("publish")
-        .value("topic", topic)
-        .value("msg", msg)
-        .end()
-}
 
 /// A forwarded message of a client; `msg` is valid JSON.
 #[must_use]
@@ -44,7 +35,7 @@ pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
         .end()
 }
 
-/// A frame of [`publish`] for `topic`, or a [series] of them, rewritten for subscribers with another spelling of
+/// A frame of [`publish`] for `topic`, or a [series](lines) of them, rewritten for subscribers with another spelling of
 /// the name.
 #[must_use]
 pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
@@ -52,7 +43,7 @@ pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
         return frames.clone();
     }
     let mut text = Vec::with_capacity(frames.len());
-    for frame in series::messages(frames.clone()) {
+    for frame in lines::messages(frames.clone()) {
         let mut line = Encoder::after(text, "publish").value("topic", spelling);
         line.key("msg");
         line.text.extend_from_slice(message_text(topic, &frame));
@@ -114,13 +105,6 @@ impl Encoder {
             self.text.extend_from_slice(b"null");
         }
         self
-    }
-
-    fn optional<T: Serialize + ?Sized>(self, key: &str, value: Option<&T>) -> Self {
-        match value {
-            Some(value) => self.value(key, value),
-            None => self,
-        }
     }
 
     fn end(mut self) -> Bytes {

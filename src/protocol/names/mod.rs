@@ -1,14 +1,14 @@
-//! Spellings of names: topics and services with and without the leading slash, types with and without their middle
-//! part.
+//! Spellings of names: topics and services with and without the leading slash.
 //!
-//! **Invariant:** two spellings of a name have the same [`absolute`] name or the same [`short_type`]. An answer keeps
-//! the spelling of the request.
+//! **Invariant:** two spellings of a name have the same [`absolute`] name. An answer keeps the spelling of the request.
 
 mod own_ids;
+mod types;
 
 use std::borrow::Cow;
 
 pub use self::own_ids::{own_id, own_id_number};
+pub use self::types::{same_type, short_type};
 
 /// The name with its leading slash, as in the registry and the catalog.
 #[must_use]
@@ -45,36 +45,4 @@ pub fn cancelled_action(service: &str) -> Option<&str> {
 pub fn spellings(name: &str) -> impl Iterator<Item = &str> {
     let short = Some(relative(name)).filter(|short| *short != name);
     std::iter::once(name).chain(short)
-}
-
-/// A type without its middle part: `std_msgs/Header` of `std_msgs/msg/Header` and of itself.
-#[must_use]
-pub fn short_type(name: &str) -> String {
-    match (name.split_once('/'), name.rsplit_once('/')) {
-        (Some((package, _)), Some((_, last))) => format!("{package}/{last}"),
-        _ => name.to_owned(),
-    }
-}
-
-/// Whether two names are spellings of the same type. A middle part that only one of them has is ignored.
-///
-/// One name is compared with every known type, so only as many bytes are read as the shorter name has.
-#[must_use]
-pub fn same_type(one: &str, other: &str) -> bool {
-    let is_longer = one.len() > other.len();
-    let (short, long) = if is_longer {
-        (other, one)
-    } else {
-        (one, other)
-    };
-    short == long || is_without_middle(short, long)
-}
-
-/// Whether `short` is `long`, another name, without its middle part or parts.
-fn is_without_middle(short: &str, long: &str) -> bool {
-    let parts = short.split_once('/');
-    let middle = parts
-        .filter(|(_, last)| !last.contains('/'))
-        .and_then(|(package, last)| long.strip_prefix(package)?.strip_suffix(last));
-    middle.is_some_and(|middle| middle.starts_with('/') && middle.ends_with('/'))
 }

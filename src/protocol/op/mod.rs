@@ -6,24 +6,25 @@
 //! of a frame that is valid JSON. A member is read only for operations that have it. For all others only its syntax is
 //! checked.
 
+mod control;
 pub mod fields;
 mod problems;
 mod providers;
 mod rejections;
-mod subscriptions;
 #[cfg(feature = "runtime")]
 pub mod token;
 mod types;
 
-use std::borrow::Cow;
 use std::time::Duration;
 
 use serde_json::value::RawValue;
 
 pub use self::problems::{OpError, Problem};
+pub use self::providers::read_start;
+use self::types::duration;
 pub use self::types::{
-    ActionGoal, Compression, Encoding, GoalStatus, MAX_QUEUE_LENGTH, MAX_THROTTLE, ProviderOp,
-    Served, Subscribe, Verbosity,
+    ActionGoal, Compression, Encoding, GoalStatus, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT,
+    ProviderOp, Served, Subscribe, Verbosity,
 };
 use super::messages::ErrorForm;
 pub use crate::protocol::limits::MAX_NAME;
@@ -33,9 +34,6 @@ use crate::protocol::wire::json::{self, Payload};
 use crate::protocol::wire::series::Series;
 use crate::protocol::wire::text;
 
-/// Longest part of the JSON parser's message in an answer, in characters. It may quote the client.
-const MAX_PARSER_MESSAGE: usize = 160;
-
 /// A parsed frame.
 #[derive(Debug)]
 pub struct Incoming {
@@ -43,23 +41,6 @@ pub struct Incoming {
     pub id: Option<Payload>,
     /// The operation.
     pub op: Result<Op, OpError>,
-}
-
-impl Incoming {
-    /// Whether it is from a command of this program.
-    #[must_use]
-    pub const fn is_command(&self) -> bool {
-        matches!(self.op, Ok(Op::Auth { is_command, .. }) if is_command)
-    }
-
-    /// Gives an error the id of the pieces of its frame. An op, such as a bad answer, keeps its own id.
-    #[must_use]
-    pub fn under_id(self, id: Option<Payload>) -> Self {
-        match self.op {
-            Err(_) => Self { id, ..self },
-            Ok(_) => self,
-        }
-    }
 }
 
 /// An operation.
@@ -139,9 +120,6 @@ pub enum Op {
     },
 }
 
-/// Longest `timeout` of a forwarded call: a day.
-pub const MAX_TIMEOUT: Duration = Duration::from_secs(24 * 3600);
-
 /// The arguments of a call: fields by name, or in documented order in an array; `{}` if they are absent or `null`. The
 /// node that serves the call refuses any other value, because some services echo their values even then.
 pub type Arguments = Payload;
@@ -217,8 +195,8 @@ const A_NAME: &str = "a non-empty string";
 #[must_use]
 pub fn read_raw(frame: RawFrame) -> Option<Incoming> {
     Some(match frame.decode()? {
-        Ok(frame) => read(&frame.text),
-        Err((error, start)) => read_start(&start, &error),
+        Ok(text) => read(&text),
+        Err((error, start)) => Incoming::of_start(&start, &error),
     })
 }
 
@@ -227,8 +205,7 @@ pub fn read_raw(frame: RawFrame) -> Option<Incoming> {
 pub fn read(frame: &str) -> Incoming {
     let (mut members, read) = Members::of(frame);
     if let Err(error) = read {
-        let message = text::shortened(&error.to_string(), MAX_PARSER_MESSAGE);
-        return refused(members, Problem::NotJson(message));
+        return members.refused(Problem::not_json(&error));
     }
     let id = members.get("id").map(Payload::from);
     let op = match members.known_op() {
@@ -238,23 +215,6 @@ pub fn read(frame: &str) -> Incoming {
         }
         Err(problem) => Err(OpError::Status(problem)),
     };
-    Incoming { id, op }
-}
-
-/// Reads the start of a frame that is refused for the reason `why`. It may be the answer to a call, which then fails.
-#[must_use]
-pub fn read_start(start: &[u8], why: &impl ToString) -> Incoming {
-    let text = start.utf8_chunks().next();
-    // The members before its end or its fault count.
-    let (members, _) = Members::of(text.map_or("", |one| one.valid()));
-    refused(members, Problem::NotAFrame(why.to_string()))
-}
-
-/// A frame that cannot be read to its end. Members before the fault count only for an answer.
-fn refused(mut members: Members<'_>, problem: Problem) -> Incoming {
-    members.op = members.known_op().unwrap_or_default();
-    let op = members.or_bad_answer(Err(problem));
-    let id = members.get("id").filter(|_| op.is_ok()).map(Payload::from);
     Incoming { id, op }
 }
 
@@ -286,10 +246,6 @@ impl<'a> Members<'a> {
         OPS.into_iter()
             .find(|known| *known == op)
             .ok_or_else(|| Problem::UnknownOp(text::excerpt(&op)))
-    }
-
-    fn required(&self, field: &'static str) -> Result<&'a RawValue, Problem> {
-        self.typed(field, "", Some)
     }
 
     /// An optional member, read by `read`. If `read` returns `None`, the value is not the `expected` one.
@@ -345,16 +301,6 @@ impl<'a> Members<'a> {
         })
     }
 
-    fn optional_text(&self, field: &'static str) -> Result<Option<String>, Problem> {
-        let text = self.optional(field, "a string", json::text)?;
-        self.short(field, text.as_deref().unwrap_or_default())?;
-        Ok(text.map(Cow::into_owned))
-    }
-
-    fn boolean(&self, field: &'static str) -> Result<bool, Problem> {
-        self.typed(field, "true or false", json::boolean)
-    }
-
     /// A ROS message, which is an object.
     fn object(&self, field: &'static str) -> Result<Payload, Problem> {
         let object = self.typed(field, "an object", |raw| {
@@ -363,34 +309,12 @@ impl<'a> Members<'a> {
         Ok(object.into())
     }
 
-    /// A call. If its service is a text, every fault gets a `service_response`.
-    fn call(&self) -> Result<CallService, OpError> {
-        self.valid_call().map_err(|problem| {
-            let answer = |service, problem| OpError::Call { service, problem };
-            self.fault("service", problem, answer)
-        })
-    }
-
-    fn valid_call(&self) -> Result<CallService, Problem> {
+    fn call(&self) -> Result<CallService, Problem> {
         Ok(CallService {
             service: self.name("service")?,
             timeout: self.timeout()?,
             args: self.args(),
         })
-    }
-
-    /// A fault of a call or a goal. Its `answer` needs the name in this field, which may be empty or too long. Without a
-    /// text there, the fault is that.
-    fn fault(
-        &self,
-        field: &'static str,
-        problem: Problem,
-        answer: impl FnOnce(String, Problem) -> OpError,
-    ) -> OpError {
-        match self.typed(field, A_NAME, json::text) {
-            Ok(name) => answer(name.into_owned(), problem),
-            Err(no_text) => OpError::Status(no_text),
-        }
     }
 
     fn args(&self) -> Arguments {
@@ -403,109 +327,24 @@ impl<'a> Members<'a> {
         let timeout = self.optional("timeout", "a finite number of seconds", |raw| {
             json::number(raw).filter(|timeout| timeout.is_finite())
         })?;
-        Ok(timeout.map(|timeout| {
-            if timeout > 0.0 {
-                duration(timeout, MAX_TIMEOUT)
-            } else {
-                MAX_TIMEOUT
-            }
-        }))
-    }
-
-    /// Converts a fault in the answer to a call or goal to an op that ends this call or goal.
-    fn or_bad_answer(&self, read: Result<Op, Problem>) -> Result<Op, OpError> {
-        let Some(kind) = self.answered() else {
-            return read.map_err(OpError::Status);
-        };
-        Ok(read.unwrap_or_else(|problem| Op::BadAnswer {
-            kind,
-            name: self.name(kind.noun()).ok(),
-            problem,
+        Ok(timeout.map(|timeout| match timeout {
+            0.0 => MAX_TIMEOUT,
+            _ => duration(timeout, MAX_TIMEOUT),
         }))
     }
 
     fn operation(&self) -> Result<Op, OpError> {
-        match self.op {
-            "call_service" => self.call().map(Op::CallService),
-            "send_action_goal" => self.goal().map(Op::SendActionGoal),
-            _ => self.or_bad_answer(self.other()),
-        }
-    }
-
-    /// Any other operation.
-    fn other(&self) -> Result<Op, Problem> {
-        Ok(match self.op {
-            "advertise" => Op::Advertise {
-                topic: self.name("topic")?,
-                type_name: self.optional_text("type")?,
-            },
-            "unadvertise" => Op::Unadvertise {
-                topic: self.name("topic")?,
-            },
-            "publish" => Op::Publish {
-                topic: self.name("topic")?,
-                msg: self.object("msg")?,
-            },
-            "subscribe" => Op::Subscribe(self.subscription()?),
-            "unsubscribe" => Op::Unsubscribe {
-                topic: self.name("topic")?,
-            },
-            "cancel_action_goal" => Op::CancelActionGoal {
-                action: self.name("action")?,
-            },
-            "fragment" => Op::Fragment(self.piece()?),
-            "set_level" => Op::SetLevel {
-                verbosity: self.verbosity()?,
-                errors: self.error_form()?,
-            },
-            "auth" => self.auth()?,
-            op if op.contains("action") => self.serve(Served::Action)?,
-            _ => self.serve(Served::Service)?,
-        })
-    }
-
-    fn serve(&self, kind: Served) -> Result<Op, Problem> {
-        let (name, op) = self.provider_op(kind)?;
-        Ok(Op::Serve { kind, name, op })
-    }
-
-    fn piece(&self) -> Result<Piece, Problem> {
-        let id = self.required("id")?;
-        self.short("id", id.get())?;
-        // A number that does not fit is refused as too large below.
-        let index = |field| {
-            let number = self.typed(field, "an integer, at least 0", json::integer)?;
-            Ok(usize::try_from(number).unwrap_or(usize::MAX))
+        let (kind, read) = match self.op {
+            "publish" => {
+                return Ok(Op::Publish {
+                    topic: self.name("topic")?,
+                    msg: self.object("msg")?,
+                });
+            }
+            "call_service" => (Served::Service, self.call().map(Op::CallService)),
+            "send_action_goal" => (Served::Action, self.goal().map(Op::SendActionGoal)),
+            _ => return self.or_bad_answer(self.other()),
         };
-        Ok(Piece {
-            id: id.get().to_owned(),
-            data: self.typed("data", "a string", json::text)?.into_owned(),
-            num: index("num")?,
-            total: index("total")?,
-        })
+        read.map_err(|problem| self.fault(kind, problem))
     }
-
-    /// Reads a client's token, if there is one. A command of this program marks itself.
-    fn auth(&self) -> Result<Op, Problem> {
-        let is_command = self.get("command").is_some() && self.boolean("command")?;
-        let token = self.get("token").map(|raw| self.secret(raw)).transpose()?;
-        Ok(Op::Auth { token, is_command })
-    }
-
-    /// A token. An error does not repeat it.
-    fn secret(&self, raw: &RawValue) -> Result<String, Problem> {
-        let token = json::text(raw).ok_or(Problem::Mistyped {
-            op: self.op,
-            field: "token",
-            expected: "a string",
-            found: "something else".to_owned(),
-        })?;
-        self.short("token", &token)?;
-        Ok(token.into_owned())
-    }
-}
-
-/// A finite number of seconds, 0 or more, as a duration of at most `longest`.
-fn duration(seconds: f64, longest: Duration) -> Duration {
-    Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
 }

@@ -2,6 +2,11 @@
 //!
 //! **Invariant:** every sentence begins with the operation and its field, if both are known.
 
+use crate::protocol::wire::text;
+
+/// Longest part of the JSON parser's message in an answer, in characters. It may quote the client.
+const MAX_PARSER_MESSAGE: usize = 160;
+
 /// Why a frame is not a valid operation, and the form of the answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpError {
@@ -76,4 +81,11 @@ pub enum Problem {
         /// Its length in bytes.
         length: usize,
     },
+}
+
+impl Problem {
+    /// A frame that the JSON parser rejects for this reason.
+    pub(super) fn not_json(error: &serde_json::Error) -> Self {
+        Self::NotJson(text::shortened(&error.to_string(), MAX_PARSER_MESSAGE))
+    }
 }

@@ -1,4 +1,5 @@
-//! Reads goals, and the operations of clients that serve a service or an action.
+//! Reads goals, and the operations of clients that serve a service or an action. Also reads
+//! frames with a fault, because such a frame may be an answer.
 //!
 //! **Invariant:** an answer has the `id` of its call or goal. A bad answer names its call or goal, if it
 //! has an `id` or the name.
@@ -8,22 +9,27 @@ use std::borrow::Cow;
 use serde_json::value::RawValue;
 
 use super::types::{ActionGoal, GoalStatus, ProviderOp, Served};
-use super::{Members, OpError, Problem};
+use super::{A_NAME, Incoming, Members, Op, OpError, Problem};
 use crate::protocol::wire::json::{self, Payload};
 
-impl Members<'_> {
-    /// A goal. If its action is a text, every fault gets an `action_result`.
-    pub(super) fn goal(&self) -> Result<ActionGoal, OpError> {
-        self.valid_goal().map_err(|problem| {
-            let answer = |action, problem| OpError::Goal { action, problem };
-            self.fault("action", problem, answer)
-        })
-    }
+/// Reads the start of a frame that is refused for the reason `why`. It may be the answer to a call, which then fails.
+#[must_use]
+pub fn read_start(start: &[u8], why: &impl ToString) -> Incoming {
+    Incoming::of_start(start, why)
+}
 
-    fn valid_goal(&self) -> Result<ActionGoal, Problem> {
-        if let Some(id) = self.get("id") {
-            self.short("id", id.get())?;
-        }
+impl Incoming {
+    pub(super) fn of_start(start: &[u8], why: &impl ToString) -> Self {
+        let text = start.utf8_chunks().next();
+        // The members before its end or its fault count.
+        let (members, _) = Members::of(text.map_or("", |one| one.valid()));
+        members.refused(Problem::NotAFrame(why.to_string()))
+    }
+}
+
+impl Members<'_> {
+    pub(super) fn goal(&self) -> Result<ActionGoal, Problem> {
+        self.short("id", self.get("id").map_or("", RawValue::get))?;
         Ok(ActionGoal {
             type_name: self.optional_text("action_type")?,
             args: self.args(),
@@ -36,7 +42,7 @@ impl Members<'_> {
     }
 
     /// The kind of the call or goal that the frame answers, if it is an answer.
-    pub(super) fn answered(&self) -> Option<Served> {
+    fn answered(&self) -> Option<Served> {
         match self.op {
             "service_response" => Some(Served::Service),
             "action_result" => Some(Served::Action),
@@ -44,8 +50,8 @@ impl Members<'_> {
         }
     }
 
-    /// The name that the sender serves, and the operation.
-    pub(super) fn provider_op(&self, kind: Served) -> Result<(String, ProviderOp), Problem> {
+    /// An operation of a client that serves.
+    pub(super) fn serve(&self, kind: Served) -> Result<Op, Problem> {
         if self.answered().is_some() || self.op == "action_feedback" {
             self.required("id")?;
         }
@@ -86,7 +92,7 @@ impl Members<'_> {
                 }
             }
         };
-        Ok((name, op))
+        Ok(Op::Serve { kind, name, op })
     }
 
     fn goal_status(&self, is_good: bool) -> Result<u8, Problem> {
@@ -100,5 +106,44 @@ impl Members<'_> {
             GoalStatus::Aborted
         };
         Ok(status.unwrap_or(usual as u8))
+    }
+
+    /// A frame that cannot be read to its end. Members before the fault count only for an answer.
+    pub(super) fn refused(mut self, problem: Problem) -> Incoming {
+        self.op = self.known_op().unwrap_or_default();
+        let op = self.or_bad_answer(Err(problem));
+        let id = self.get("id").filter(|_| op.is_ok()).map(Payload::from);
+        Incoming { id, op }
+    }
+
+    /// Converts a fault in the answer to a call or goal to an op that ends this call or goal.
+    pub(super) fn or_bad_answer(&self, read: Result<Op, Problem>) -> Result<Op, OpError> {
+        let Some(kind) = self.answered() else {
+            return read.map_err(OpError::Status);
+        };
+        Ok(read.unwrap_or_else(|problem| Op::BadAnswer {
+            kind,
+            name: self.name(kind.noun()).ok(),
+            problem,
+        }))
+    }
+
+    /// A fault of a call or a goal. Its answer needs the name of the service or action, which may be empty or too long.
+    /// Without a text there, the fault is that.
+    pub(super) fn fault(&self, kind: Served, problem: Problem) -> OpError {
+        let name = match self.typed(kind.noun(), A_NAME, json::text) {
+            Ok(name) => name.into_owned(),
+            Err(no_text) => return OpError::Status(no_text),
+        };
+        match kind {
+            Served::Service => OpError::Call {
+                service: name,
+                problem,
+            },
+            Served::Action => OpError::Goal {
+                action: name,
+                problem,
+            },
+        }
     }
 }

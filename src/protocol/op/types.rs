@@ -7,11 +7,18 @@ use std::time::Duration;
 use crate::protocol::messages::Level;
 use crate::protocol::wire::json::Payload;
 
+/// Longest `timeout` of a forwarded call: a day.
+pub const MAX_TIMEOUT: Duration = Duration::from_secs(24 * 3600);
 /// Longest `throttle_rate`: a year; beyond it, a delivery is never due in a connection's lifetime.
 pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
 /// Largest `queue_length`. The [outbox](crate::protocol::outbox) bounds held messages by bytes, and no message has
 /// fewer than 40.
 pub const MAX_QUEUE_LENGTH: usize = 100_000;
+
+/// A finite number of seconds as a duration of at most `longest`, which a negative number gives too.
+pub(super) fn duration(seconds: f64, longest: Duration) -> Duration {
+    Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
+}
 
 /// The lowest severity of statuses that a client gets; `None` for no status at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

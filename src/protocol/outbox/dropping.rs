@@ -10,7 +10,7 @@ use bytes::Bytes;
 use super::Outbox;
 use super::message::{QueuedMessage, counted};
 use crate::protocol::limits::MAX_FRAME;
-use crate::protocol::wire::series::{by_itself, first_message, first_messages, last_messages};
+use crate::protocol::wire::lines::{by_itself, first_message, first_messages, last_messages};
 
 /// Most bytes of topic messages that wait for one connection, each with [`MESSAGE_BYTES`]: ten seconds of the arm's
 /// own. A message longer than [`MEDIUM`](crate::protocol::limits::MEDIUM) uses the shared pool and counts as that many
@@ -32,33 +32,6 @@ impl Outbox {
         let fits = frame.len() <= MAX_MESSAGE;
         self.dropped += u64::from(!fits);
         fits
-    }
-
-    /// Drops the oldest messages of a topic with more waiting messages than the client's `queue_length`, while the
-    /// client is slow.
-    pub(super) fn keep_to_queue_length(&mut self, topic: &Arc<str>) {
-        if self.writing.is_empty() && self.room != Some(0) {
-            return;
-        }
-        let limits = self.limits.get(topic);
-        let Some(most) = limits.and_then(|limits| limits.throttle.queue_length) else {
-            return;
-        };
-        let waiting = self.topics.iter().filter(|message| message.is_on(topic));
-        let mut surplus = waiting.count().saturating_sub(most);
-        let (mut index, mut before) = (0, 0);
-        self.topics.retain(|message| {
-            let stays = surplus == 0 || !message.is_on(topic);
-            if !stays {
-                surplus -= 1;
-                self.waiting.forget(message);
-                self.dropped += message.count();
-                before += usize::from(index < self.kept_old);
-            }
-            index += 1;
-            stays
-        });
-        self.kept_old -= before;
     }
 
     /// Drops messages that have waited too long, except the newest of each topic.

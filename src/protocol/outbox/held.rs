@@ -12,7 +12,7 @@ use super::Outbox;
 use super::message::QueuedMessage;
 use super::throttle::Throttle;
 use crate::protocol::limits::MEDIUM;
-use crate::protocol::wire::series::{by_itself, first_message, last_messages, messages};
+use crate::protocol::wire::lines::{by_itself, first_message, last_messages, messages};
 
 impl Outbox {
     /// Sets the limits of a topic, or removes them after an unsubscription. Queued messages are still sent. If the
@@ -71,6 +71,33 @@ impl Outbox {
             }
             limits.trim(&mut self.waiting);
         }
+    }
+
+    /// Drops the oldest messages of a topic with more waiting messages than the client's `queue_length`, while the
+    /// client is slow.
+    pub(super) fn keep_to_queue_length(&mut self, topic: &Arc<str>) {
+        if self.writing.is_empty() && self.room != Some(0) {
+            return;
+        }
+        let limits = self.limits.get(topic);
+        let Some(most) = limits.and_then(|limits| limits.throttle.queue_length) else {
+            return;
+        };
+        let waiting = self.topics.iter().filter(|message| message.is_on(topic));
+        let mut surplus = waiting.count().saturating_sub(most);
+        let (mut index, mut before) = (0, 0);
+        self.topics.retain(|message| {
+            let stays = surplus == 0 || !message.is_on(topic);
+            if !stays {
+                surplus -= 1;
+                self.waiting.forget(message);
+                self.dropped += message.count();
+                before += usize::from(index < self.kept_old);
+            }
+            index += 1;
+            stays
+        });
+        self.kept_old -= before;
     }
 
     /// Whether any message is held back.

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use crate::protocol::limits::MEDIUM;
-use crate::protocol::wire::series::messages;
+use crate::protocol::wire::lines::messages;
 
 /// A topic message that waits, or a series of them.
 #[derive(Debug)]

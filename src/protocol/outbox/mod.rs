@@ -14,10 +14,12 @@
 //! **Invariant:** dropping removes whole messages and never reorders. At most [`MAX_TOPIC_BYTES`] of topic messages
 //! wait, including those held back.
 
+mod counts;
 mod dropping;
 pub mod flow;
 mod held;
 mod message;
+mod slow;
 mod throttle;
 
 use std::cmp::Ordering;
@@ -31,8 +33,8 @@ pub use self::dropping::{MAX_AGE, MAX_MESSAGE, MAX_TOPIC_BYTES, MESSAGE_BYTES};
 use self::message::{QueuedMessage, Waiting, counted};
 pub use self::throttle::Throttle;
 use self::throttle::TopicLimits;
-use crate::protocol::limits::{MEDIUM, SHORT};
-use crate::protocol::wire::series::first_message;
+use crate::protocol::limits::SHORT;
+use crate::protocol::wire::lines::first_message;
 
 /// The outgoing queue of one connection.
 #[derive(Debug, Default)]
@@ -213,15 +215,6 @@ impl Outbox {
         self.check_sums();
     }
 
-    /// Whether a long topic message waits or is being written. Messages that are held back do not count.
-    #[must_use]
-    pub fn has_long(&self) -> bool {
-        let mut waiting = self.topics.iter();
-        let mut writing = self.writing.iter();
-        waiting.any(|message| message.frame.len() > MEDIUM)
-            || writing.any(|frame| frame.length > MEDIUM && !frame.is_response)
-    }
-
     /// Whether no frame can be taken now. Held messages that are not due do not count.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -232,37 +225,6 @@ impl Outbox {
     #[must_use]
     pub fn has_responses(&self) -> bool {
         !self.responses.is_empty()
-    }
-
-    /// Bytes of waiting responses, including those being written.
-    #[must_use]
-    pub const fn response_bytes(&self) -> usize {
-        self.response_bytes
-    }
-
-    /// The same without responses that have a permit.
-    #[must_use]
-    pub const fn short_bytes(&self) -> usize {
-        self.short_bytes
-    }
-
-    /// The number of waiting topic messages or series, including held ones.
-    #[must_use]
-    pub const fn topic_count(&self) -> usize {
-        self.waiting.count
-    }
-
-    /// Counted bytes of waiting topic messages, including held ones.
-    #[must_use]
-    pub const fn topic_bytes(&self) -> usize {
-        self.waiting.bytes
-    }
-
-    /// Topic messages dropped so far because of the limits. A message that throttling replaces by a newer one
-    /// is not counted.
-    #[must_use]
-    pub const fn dropped(&self) -> u64 {
-        self.dropped
     }
 
     /// Whether topic messages wait, without held ones.
@@ -320,28 +282,5 @@ impl Outbox {
             self.kept_old -= 1;
         }
         Some(message)
-    }
-
-    /// Compares the sums with the messages that they are of. Builds without debug assertions omit it.
-    fn check_sums(&self) {
-        if !cfg!(debug_assertions) {
-            return;
-        }
-        let held = self.limits.values().flat_map(|limits| &limits.held);
-        let mut waiting = Waiting::default();
-        held.chain(&self.topics).for_each(|one| waiting.add(one));
-        debug_assert_eq!(self.waiting, waiting);
-        debug_assert!(self.kept_old <= self.topics.len());
-        let queued = self.responses.iter();
-        let queued = queued.map(|(_, frame)| (frame.len(), frame.len()));
-        let writing = self.writing.iter().filter(|frame| frame.is_response);
-        let writing = writing.map(|frame| (frame.rest.len(), frame.length));
-        let responses = || queued.clone().chain(writing.clone());
-        let short = responses().filter(|(_, length)| *length <= SHORT);
-        debug_assert_eq!(self.short_bytes, short.map(|(rest, _)| rest).sum::<usize>());
-        debug_assert_eq!(
-            self.response_bytes,
-            responses().map(|(rest, _)| rest).sum::<usize>()
-        );
     }
 }

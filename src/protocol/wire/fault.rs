@@ -2,6 +2,8 @@
 //!
 //! **Invariant:** at most [`KEPT_START`] bytes are kept.
 
+use std::string::FromUtf8Error;
+
 use super::text;
 use crate::protocol::limits::MAX_NESTING;
 
@@ -51,9 +53,18 @@ pub enum FrameError {
     },
 }
 
+/// A frame that cannot be read: the reason, and its kept bytes.
+pub(super) type Refused = (FrameError, Vec<u8>);
+
 /// The kept bytes from the start of a frame that cannot be read.
 pub(super) fn start_of(bytes: &[u8]) -> Vec<u8> {
     bytes.get(..KEPT_START).unwrap_or(bytes).to_vec()
+}
+
+/// A frame that is not UTF-8.
+pub(super) fn not_utf8(error: &FromUtf8Error) -> Refused {
+    let at = error.utf8_error().valid_up_to();
+    (FrameError::NotUtf8 { at }, start_of(error.as_bytes()))
 }
 
 /// The error for a line that is not an object.

@@ -1,69 +1,22 @@
 //! JSON that is passed on: the members of an object, and payloads, strict about numbers.
 //!
-//! In forwarded payloads a number that overflows becomes `null`. `values.rs` has the values that the runtime reads
-//! itself.
+//! In forwarded payloads a number that overflows becomes `null` (`literals.rs`). `values.rs` has the values that the
+//! runtime reads itself.
 //!
 //! **Invariant:** a fixed number of passes over any text. A [`Payload`] is checked when it comes. Its text is
 //! one line of valid JSON, ready to be copied.
 
 use std::borrow::Cow;
-use std::cmp::Ordering;
 use std::fmt;
-use std::iter::repeat;
 use std::sync::Arc;
 
 use serde::de::{DeserializeSeed, Deserializer, MapAccess, Visitor};
 use serde::{Serialize, Serializer};
 use serde_json::value::RawValue;
 
-pub(crate) use super::values::{Entries, INFINITY, NAN, entries, for_each};
-pub use super::values::{accept_literals, boolean, integer, number};
-
-/// Digits of the largest finite `f64` before the point. A shorter number without an exponent cannot overflow.
-const SAFE_DIGITS: usize = OVERFLOW.len() - 1;
-/// The least number that rounds to infinity: 2^1024 - 2^970, halfway between the largest `f64` and the next power of
-/// two.
-const OVERFLOW: &[u8; 309] = b"\
-    1797693134862315807937289714053034150799341327100378269361737789804449682927647509466490179775872070963\
-    3028641669288791094655554785194040263065748867150582068190890200070838367627385484581771153176447573027\
-    0069855571366959622842914819860834936475292719074168444365510704342711559699508093042880177904174497792";
-
-/// Replaces every number that overflows an `f64` by `null`. All other bytes of the valid JSON text `raw` do not change.
-#[must_use]
-pub fn strict(raw: &str) -> Cow<'_, str> {
-    let checked = |bytes: &[u8], at| {
-        let end = next_of(bytes, at, |byte| !is_numeric(byte)).unwrap_or(bytes.len());
-        let overflows = overflows(bytes.get(at..end).unwrap_or_default());
-        (end, overflows.then_some("null"))
-    };
-    let strict = replaced(raw, |byte| matches!(byte, b'-' | b'0'..=b'9'), checked);
-    strict.map_or(Cow::Borrowed(raw), Cow::Owned)
-}
-
-/// The text with other tokens outside strings; `None` if nothing changes. `token` returns the end of the token at a byte
-/// that `begins` accepts, and what replaces it.
-pub(super) fn replaced(
-    text: &str,
-    begins: impl Fn(u8) -> bool,
-    token: impl Fn(&[u8], usize) -> (usize, Option<&'static str>),
-) -> Option<String> {
-    let bytes = text.as_bytes();
-    let mut output = String::new();
-    let (mut copied, mut at) = (0, 0);
-    while let Some(found) = next_of(bytes, at, |byte| byte == b'"' || begins(byte)) {
-        let (end, replacement) = match bytes.get(found) {
-            Some(b'"') => (string_end(bytes, found), None),
-            _ => token(bytes, found),
-        };
-        at = end;
-        if let Some(replacement) = replacement {
-            output.push_str(text.get(copied..found).unwrap_or_default());
-            output.push_str(replacement);
-            copied = end;
-        }
-    }
-    (copied > 0).then(|| output + text.get(copied..).unwrap_or_default())
-}
+pub use super::literals::{accept_literals, strict};
+pub(crate) use super::values::{Entries, entries, for_each, members};
+pub use super::values::{boolean, integer, number};
 
 /// The text of a JSON string; `None` if `raw` is not a string, or if it has half of a surrogate pair, which is
 /// not valid text.
@@ -77,80 +30,14 @@ pub fn text(raw: &RawValue) -> Option<Cow<'_, str>> {
     Some(Cow::Borrowed(inner))
 }
 
-const fn is_numeric(byte: u8) -> bool {
-    matches!(byte, b'0'..=b'9' | b'-' | b'+' | b'.' | b'e' | b'E')
-}
+// ---- the members of an object, read in one pass ---------------------------------------------------------------------
 
-/// Whether a JSON number rounds to infinity, from its digits and its exponent, in one pass. Parsing it to an `f64`
-/// may be hundreds of times slower, if it is close to halfway between two doubles.
-fn overflows(token: &[u8]) -> bool {
-    let exponent_at = token.iter().position(|byte| matches!(byte, b'e' | b'E'));
-    if exponent_at.is_none() && token.len() <= SAFE_DIGITS {
-        return false;
-    }
-    let (mantissa, exponent) = token.split_at(exponent_at.unwrap_or(token.len()));
-    let mantissa = mantissa.strip_prefix(b"-").unwrap_or(mantissa);
-    let point = mantissa.iter().position(|byte| *byte == b'.');
-    let point = point.unwrap_or(mantissa.len());
-    let Some(first) = mantissa.iter().position(|byte| matches!(byte, b'1'..=b'9')) else {
-        return false;
-    };
-    // The number of digits before the point after applying the exponent; 0 or less if zeros follow the point.
-    let zeros = mantissa.iter().take(first).filter(|byte| **byte == b'0');
-    let shift = whole(point) - whole(zeros.count());
-    match shift
-        .saturating_add(power(exponent))
-        .cmp(&whole(OVERFLOW.len()))
-    {
-        Ordering::Less => false,
-        Ordering::Greater => true,
-        Ordering::Equal => {
-            let digits = mantissa.iter().skip(first).filter(|byte| **byte != b'.');
-            digits
-                .chain(repeat(&b'0'))
-                .take(OVERFLOW.len())
-                .ge(OVERFLOW)
-        }
-    }
-}
-
-/// The value of an exponent with its `e`. Saturates; 0 if there is none.
-fn power(exponent: &[u8]) -> i64 {
-    let digits = exponent.iter().filter(|byte| byte.is_ascii_digit());
-    let value = digits.fold(0_i64, |value, digit| {
-        value
-            .saturating_mul(10)
-            .saturating_add(i64::from(digit - b'0'))
-    });
-    if exponent.contains(&b'-') {
-        -value
-    } else {
-        value
-    }
-}
-
-fn whole(length: usize) -> i64 {
-    i64::try_from(length).unwrap_or(i64::MAX)
-}
-
-// ---- the members of an object and the entries of an array, read in one pass -----------------------------------------
-
-/// Reads the JSON object `text` and returns, for each of `names`, the raw value of that key. Of repeated keys the last
-/// one counts. Of other members only the syntax is checked.
+/// Reads the JSON object `text`, and puts into `values` the raw value of each of `names`. Of repeated keys the last one
+/// counts. Of other members only the syntax is checked. `values` is as long as `names`.
 ///
 /// # Errors
 /// If `text` is not one valid JSON object. The reason does not quote a string, because escaping it would take fifty
 /// times as long as reading it.
-pub(crate) fn members<'a, const N: usize>(
-    text: &'a str,
-    names: &[&str; N],
-) -> Result<[Option<&'a RawValue>; N], serde_json::Error> {
-    let mut values = [None; N];
-    members_into(text, names, &mut values)?;
-    Ok(values)
-}
-
-/// [`members`] for a list of names whose length is known at run time; `values` is as long as `names`.
 pub(crate) fn members_into<'a>(
     text: &'a str,
     names: &[&str],
@@ -195,26 +82,6 @@ impl<'a> Visitor<'a> for Members<'_, '_, 'a> {
         }
         Ok(())
     }
-}
-
-/// The index of the first byte from `at` on that `wanted` accepts.
-fn next_of(bytes: &[u8], at: usize, wanted: impl Fn(u8) -> bool) -> Option<usize> {
-    let rest = bytes.get(at..)?;
-    rest.iter()
-        .position(|&byte| wanted(byte))
-        .map(|offset| at + offset)
-}
-
-/// The index after the string that begins at `open`; the end of the text if it is not closed.
-pub(crate) fn string_end(bytes: &[u8], open: usize) -> usize {
-    let mut at = open + 1;
-    while let Some(found) = next_of(bytes, at, |byte| matches!(byte, b'"' | b'\\')) {
-        if bytes.get(found) == Some(&b'"') {
-            return found + 1;
-        }
-        at = found + 2;
-    }
-    bytes.len()
 }
 
 // ---- JSON that is passed on or echoed: ids, messages, arguments, answers --------------------------------------------

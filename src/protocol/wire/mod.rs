@@ -6,8 +6,13 @@ mod fault;
 pub mod fragments;
 pub mod frame;
 pub mod json;
+pub mod lines;
+pub(crate) mod literals;
+mod malformed;
 pub mod opening;
 pub mod series;
 pub(crate) mod text;
 mod values;
 pub mod websocket;
+
+pub use self::malformed::Frame;

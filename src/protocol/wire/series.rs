@@ -1,8 +1,7 @@
 //! Messages that can be forwarded unchanged: a series of `publish` frames on one topic, one per line, each spelled
 //! as the runtime would write it.
 //!
-//! Compact JSON in the order `op`, `topic`, `msg` has this form. Such a line is checked in one pass and forwarded
-//! unchanged, without parsing and encoding.
+//! Compact JSON in the order `op`, `topic`, `msg` has this form. Such a line is checked in one pass.
 //!
 //! **Invariant:** a series is forwarded byte for byte as the general reader and writer would do it. All other
 //! messages are left to these.
@@ -16,9 +15,9 @@ use crate::protocol::limits::MAX_NAME;
 pub const MAX_SERIES: usize = 64 * 1024;
 
 /// The start of a message in a series.
-const HEAD: &[u8] = b"{\"op\":\"publish\",\"topic\":\"";
-/// The text between topic and message, including the message's brace.
-const MIDDLE: &[u8] = b"\",\"msg\":{";
+pub(super) const HEAD: &[u8] = b"{\"op\":\"publish\",\"topic\":\"";
+/// The text between the topic's quote and the message, including the message's brace.
+const MIDDLE: &[u8] = b",\"msg\":{";
 /// The text after the message's closing brace.
 const END: &[u8] = b"}\n";
 /// Longest number whose value is certainly finite: the largest `f64` has 309 digits.
@@ -33,95 +32,28 @@ pub struct Series {
     pub frames: Bytes,
 }
 
-/// The series at the start of `bytes`: its topic and its length. `None` if they do not begin with a whole message
-/// of a series.
-pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
+/// The series at the start of `bytes`. `None` if they do not begin with a whole message of a series.
+pub(super) fn leading(bytes: &[u8]) -> Option<Series> {
     // A longer line is not a series, so no more bytes are read to check it.
     let bytes = bytes.get(..MAX_SERIES).unwrap_or(bytes);
     let name = bytes.strip_prefix(HEAD)?;
-    let end = name
-        .iter()
-        .take(MAX_NAME + 1)
-        .position(|byte| *byte == b'"')?;
-    let topic = name.get(..end)?;
-    let is_plain = |byte: &u8| (b' '..0x7f).contains(byte) && *byte != b'\\';
-    if !topic.starts_with(b"/") || !topic.iter().all(is_plain) {
-        return None;
-    }
-    let topic = std::str::from_utf8(topic).ok()?;
+    let end = string(name, 0)?;
+    let topic = std::str::from_utf8(name.get(..end - 1)?).ok()?;
     let head = bytes.get(..HEAD.len() + end + MIDDLE.len())?;
-    if !head.ends_with(MIDDLE) || Topic::from_name(topic).is_some() {
+    let is_usual = topic.starts_with('/') && topic.len() <= MAX_NAME && head.ends_with(MIDDLE);
+    if !is_usual || Topic::from_name(topic).is_some() {
         return None;
     }
     let mut length = 0;
     while let Some(whole) = bytes.get(length..).and_then(|rest| message(rest, head)) {
         length += whole;
     }
-    (length > 0).then_some((topic, length))
-}
-
-/// The length of the first message of frames for one client: one line of a series, or all of anything else
-/// (fragments, binary, or more bytes than a series has). The time does not depend on the length of the message.
-#[must_use]
-pub fn first_message(frames: &[u8]) -> usize {
-    first_messages(frames, 0).0
-}
-
-/// The length and number of the first messages of frames for one client that have at least `bytes` bytes together:
-/// at least one, at most all.
-#[must_use]
-pub fn first_messages(frames: &[u8], bytes: usize) -> (usize, usize) {
-    if frames.len() > MAX_SERIES || !frames.starts_with(HEAD) {
-        return (frames.len(), 1);
-    }
-    let from = bytes.saturating_sub(1).min(frames.len());
-    let (before, behind) = frames.split_at(from);
-    let end = behind.iter().position(|byte| *byte == b'\n');
-    let end = end.map_or(frames.len(), |end| from + end + 1);
-    (end, lines(before) + 1)
-}
-
-/// The number of line ends in `bytes`. They are counted in chunks whose count fits into a byte, which compiles to much
-/// faster code.
-fn lines(bytes: &[u8]) -> usize {
-    let ends = |part: &[u8]| part.iter().map(|byte| u8::from(*byte == b'\n')).sum::<u8>();
-    let parts = bytes.chunks(u8::MAX.into());
-    parts.map(|part| usize::from(ends(part))).sum()
-}
-
-/// The last messages of a series, at most `count`.
-#[must_use]
-pub fn last_messages(mut frames: Bytes, count: usize) -> Bytes {
-    let mut start = frames.len();
-    for _ in 0..count {
-        // A message ends with its newline.
-        let before = frames.get(..start.saturating_sub(1)).unwrap_or_default();
-        start = before
-            .iter()
-            .rposition(|byte| *byte == b'\n')
-            .map_or(0, |end| end + 1);
-        if start == 0 {
-            break;
-        }
-    }
-    frames.split_off(start)
-}
-
-/// Each message of `frames`.
-pub fn messages(mut frames: Bytes) -> impl Iterator<Item = Bytes> {
-    std::iter::from_fn(move || {
-        (!frames.is_empty()).then(|| frames.split_to(first_message(&frames)))
+    let frames = bytes.get(..length).filter(|frames| !frames.is_empty())?;
+    Some(Series {
+        topic: topic.into(),
+        // A copy, so it does not keep the stream's buffer in memory.
+        frames: Bytes::copy_from_slice(frames),
     })
-}
-
-/// A message that does not keep the others of its series in memory: a copy if it `is_part` of one.
-#[must_use]
-pub fn by_itself(message: Bytes, is_part: bool) -> Bytes {
-    if is_part {
-        Bytes::copy_from_slice(&message)
-    } else {
-        message
-    }
 }
 
 /// The length of the frame at the start of `bytes`, including its newline, if it has that head and is suitable for a
@@ -214,12 +146,8 @@ fn word(bytes: &[u8], at: usize) -> Option<usize> {
 
 /// Skips a number. It stops before an exponent, which then fails the check of the next token.
 fn number(bytes: &[u8], start: usize) -> Option<usize> {
-    let mut at = start;
-    if *bytes.get(at)? == b'-' {
-        at += 1;
-    }
-    let whole = at;
-    at = past_digits(bytes, at);
+    let whole = start + usize::from(*bytes.get(start)? == b'-');
+    let mut at = past_digits(bytes, whole);
     let has_leading_zero = at - whole > 1 && bytes.get(whole) == Some(&b'0');
     if at == whole || has_leading_zero {
         return None;

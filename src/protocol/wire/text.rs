@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use serde_json::value::RawValue;
 
-use super::json;
+use super::literals::{INFINITY, NAN};
 
 /// Most characters of clients' text in a message: enough to recognise it, and one line on a terminal.
 pub(crate) const EXCERPT: usize = 48;
@@ -71,9 +71,9 @@ pub(crate) fn found(raw: &RawValue) -> String {
         object if object.starts_with('{') => "an object".to_owned(),
         array if array.starts_with('[') => "an array".to_owned(),
         // The reader has replaced `NaN` and `Infinity` by these.
-        json::NAN => "NaN".to_owned(),
-        json::INFINITY => "Infinity".to_owned(),
-        negative if negative.strip_prefix('-') == Some(json::INFINITY) => "-Infinity".to_owned(),
+        NAN => "NaN".to_owned(),
+        INFINITY => "Infinity".to_owned(),
+        negative if negative.strip_prefix('-') == Some(INFINITY) => "-Infinity".to_owned(),
         _ => excerpt(raw.get()),
     }
 }

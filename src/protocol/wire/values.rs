@@ -11,47 +11,7 @@ use std::fmt;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 use serde_json::value::RawValue;
 
-use super::json::replaced;
-
-/// The text that replaces `NaN` in the input. It is read as infinity, because no valid input distinguishes the two.
-pub(crate) const NAN: &str = "9e999";
-/// The text that replaces `Infinity` in the input. The sign before it stays.
-pub(crate) const INFINITY: &str = "1e999";
-
-/// Replaces `NaN`, `Infinity` and `-Infinity` (outside strings, as whole tokens) by literals that overflow. The
-/// rest does not change.
-#[must_use]
-pub fn accept_literals(text: String) -> String {
-    let literal = |bytes: &[u8], at| {
-        let (name, literal, is_signed) = match bytes.get(at) {
-            Some(b'N') => ("NaN", NAN, false),
-            _ => ("Infinity", INFINITY, true),
-        };
-        match whole_token(bytes, at, name, is_signed) {
-            true => (at + name.len(), Some(literal)),
-            false => (at + 1, None),
-        }
-    };
-    let accepted = replaced(&text, |byte| matches!(byte, b'N' | b'I'), literal);
-    accepted.unwrap_or(text)
-}
-
-/// Whether `name` is a whole token at `at`, and not part of a longer one (`1Infinity`, `NaNs`).
-fn whole_token(bytes: &[u8], at: usize, name: &str, signed: bool) -> bool {
-    let before = |back: usize| at.checked_sub(back).and_then(|index| bytes.get(index));
-    let sign = usize::from(signed && before(1) == Some(&b'-'));
-    bytes
-        .get(at..)
-        .is_some_and(|rest| rest.starts_with(name.as_bytes()))
-        && !before(1 + sign).is_some_and(|byte| is_token(*byte))
-        && !bytes
-            .get(at + name.len())
-            .is_some_and(|byte| is_token(*byte))
-}
-
-const fn is_token(byte: u8) -> bool {
-    byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'.' | b'+' | b'-')
-}
+use super::json::members_into;
 
 /// The value of a JSON number, infinite if the literal overflows; `None` if `raw` is not a number.
 #[must_use]
@@ -86,6 +46,16 @@ pub fn boolean(raw: &RawValue) -> Option<bool> {
         "false" => Some(false),
         _ => None,
     }
+}
+
+/// [`members_into`] for a fixed number of names: returns their values.
+pub(crate) fn members<'a, const N: usize>(
+    text: &'a str,
+    names: &[&str; N],
+) -> Result<[Option<&'a RawValue>; N], serde_json::Error> {
+    let mut values = [None; N];
+    members_into(text, names, &mut values)?;
+    Ok(values)
 }
 
 /// The entries of a JSON array.

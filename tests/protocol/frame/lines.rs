@@ -1,6 +1,6 @@
 //! Frames in lines: their beginning and end, and the effect of a malformed one.
 
-use pendularm::protocol::wire::frame::{Frame, FrameReader};
+use pendularm::protocol::wire::{Frame, frame::FrameReader};
 
 use super::{Outcome, outcomes, read};
 

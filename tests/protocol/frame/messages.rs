@@ -9,7 +9,7 @@ use super::nested;
 /// The text of the frame; `None` if there is only white space.
 fn read(message: &str) -> Option<Result<String, FrameError>> {
     let decoded = RawFrame::of_message(message.into()).decode()?;
-    Some(decoded.map(|frame| frame.text).map_err(|(error, start)| {
+    Some(decoded.map_err(|(error, start)| {
         assert!(message.trim().as_bytes().starts_with(&start), "{message:?}");
         error
     }))
