@@ -74,7 +74,9 @@ impl LongFrames {
         let whole = match self.fragments.take(piece, Instant::now().into_std()) {
             Ok(Some(whole)) => whole,
             Ok(None) => return Ok(None),
-            Err((why, start)) => return Ok(Some((op::read_start(&start, &why).under_id(id), 0))),
+            Err((why, start)) => {
+                return Ok(Some((Incoming::of_start(&start, &why).under_id(id), 0)));
+            }
         };
         let length = whole.bytes();
         let join = move || RawFrame::of_message(whole.text().into_bytes());

@@ -20,7 +20,6 @@ use std::time::Duration;
 use serde_json::value::RawValue;
 
 pub use self::problems::{OpError, Problem};
-pub use self::providers::read_start;
 use self::types::duration;
 pub use self::types::{
     ActionGoal, Compression, Encoding, GoalStatus, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT,

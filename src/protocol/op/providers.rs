@@ -12,14 +12,10 @@ use super::types::{ActionGoal, GoalStatus, ProviderOp, Served};
 use super::{A_NAME, Incoming, Members, Op, OpError, Problem};
 use crate::protocol::wire::json::{self, Payload};
 
-/// Reads the start of a frame that is refused for the reason `why`. It may be the answer to a call, which then fails.
-#[must_use]
-pub fn read_start(start: &[u8], why: &impl ToString) -> Incoming {
-    Incoming::of_start(start, why)
-}
-
 impl Incoming {
-    pub(super) fn of_start(start: &[u8], why: &impl ToString) -> Self {
+    /// Reads the start of a frame that is refused for the reason `why`. It may be the answer to a call, which then fails.
+    #[must_use]
+    pub fn of_start(start: &[u8], why: &impl ToString) -> Self {
         let text = start.utf8_chunks().next();
         // The members before its end or its fault count.
         let (members, _) = Members::of(text.map_or("", |one| one.valid()));

@@ -100,6 +100,15 @@ impl Outbox {
         self.kept_old -= before;
     }
 
+    /// Adds feedback of a goal. It may be dropped like a message, but no throttle holds it back, not even that of
+    /// a topic with the action's name.
+    pub fn push_feedback(&mut self, frame: Bytes, now: Instant) {
+        if self.may_fit(&frame) {
+            self.enqueue(None, now, frame);
+            self.keep_bounded();
+        }
+    }
+
     /// Whether any message is held back.
     #[must_use]
     pub fn holds_back(&self) -> bool {

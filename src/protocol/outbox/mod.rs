@@ -99,15 +99,6 @@ impl Outbox {
         self.check_sums();
     }
 
-    /// Adds feedback of a goal. It may be dropped like a message, but no throttle holds it back, not even that of
-    /// a topic with the action's name.
-    pub fn push_feedback(&mut self, frame: Bytes, now: Instant) {
-        if self.may_fit(&frame) {
-            self.enqueue(None, now, frame);
-            self.keep_bounded();
-        }
-    }
-
     /// Adds a response or a status. Held messages of the topics in `supersedes` are outdated by it, and are discarded.
     pub fn push_response(&mut self, frame: Bytes, supersedes: &[&str]) {
         self.discard_held(supersedes);

@@ -9,15 +9,16 @@ use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
 use bytes::{Bytes, BytesMut};
-use tokio::time::Instant;
+use tokio::time::{Instant, timeout};
 
 use super::client::{ClientWriter, Connection};
-use super::reader::{ClientReader, ReadStep};
+use super::reader::{ClientReader, ReadStep, effect};
 use super::transport::{ClientLost, ClientStream};
 use crate::actors::compute::computations::Computations;
 use crate::actors::gateway::limits::{
     DISCARD_BYTES, FRAME_TIME, LINGER, LOOK_AGAIN, READ_BYTES, RESPONSES_TIME, STALL_LIMIT,
 };
+use crate::actors::gateway::registry::Retire;
 use crate::actors::resources::turns::end_turn;
 use crate::actors::resources::unread::closed;
 use crate::protocol::messages::{self, Level};
@@ -94,6 +95,14 @@ impl ClientReader {
         }
         self.blocked = None;
         Poll::Ready(Ok(()))
+    }
+
+    /// Withdraws the client's registrations, because it can no longer answer calls.
+    pub(super) fn retire<S: ClientStream>(&self, client: &Connection<S>) -> ReadStep {
+        let retired = client.registry.send(Retire(self.id));
+        let gone = timeout(RESPONSES_TIME, closed(client.ends));
+        let gone = async move { gone.await.unwrap_or_default() };
+        ReadStep::Retiring(Some(Box::pin(effect(retired))), Box::pin(gone))
     }
 }
 

@@ -13,18 +13,17 @@ use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
 use bytes::BytesMut;
-use tokio::time::{Instant, timeout};
+use tokio::time::Instant;
 
 use super::client::Connection;
 use super::transport::{ClientLost, ClientStream};
 use crate::actors::ConnectionId;
 use crate::actors::compute::long_frames::{LongFrame, LongFrames, Parsed};
-use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, READ_BYTES, RESPONSES_TIME};
+use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, READ_BYTES};
 use crate::actors::gateway::registry::{Handled, Request, Retire};
 use crate::actors::resources::long_work::SHORT_WORK;
 use crate::actors::resources::memory::Permit;
 use crate::actors::resources::turns::{Timer, end_turn};
-use crate::actors::resources::unread::closed;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::{self, CallService, Compression, Incoming, Op, Problem, Subscribe};
 use crate::protocol::wire::frame::{Foreign, FrameError, FramePart, is_host_line};
@@ -39,7 +38,7 @@ type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 #[derive(Default)]
 pub(super) struct ClientReader {
     step: ReadStep,
-    id: ConnectionId,
+    pub(super) id: ConnectionId,
     /// Pieces of a message and the memory permit. While a long frame is parsed, its future owns them.
     pub(super) long: LongFrames,
     /// Received bytes that the transport has not read yet.
@@ -172,7 +171,7 @@ impl ClientReader {
             // An incomplete frame is an error.
             let unfinished = client.transport()?.finish();
             return Poll::Ready(Ok(unfinished.map_or(ReadStep::Cutting, |error| {
-                self.perform(client, op::read_start(&[], &error), 0)
+                self.perform(client, Incoming::of_start(&[], &error), 0)
             })));
         }
         self.bytes += self.chunk.len();
@@ -260,7 +259,7 @@ impl ClientReader {
                 ReadStep::Cutting
             }
             FramePart::Error(error, start) => {
-                self.perform(client, op::read_start(&start, &error), 0)
+                self.perform(client, Incoming::of_start(&start, &error), 0)
             }
         }
     }
@@ -297,18 +296,10 @@ impl ClientReader {
         }
         ReadStep::Performing(Box::pin(effect(client.registry.send(request))))
     }
-
-    /// Withdraws the client's registrations, because it can no longer answer calls.
-    fn retire<S: ClientStream>(&self, client: &Connection<S>) -> ReadStep {
-        let retired = client.registry.send(Retire(self.id));
-        let gone = timeout(RESPONSES_TIME, closed(client.ends));
-        let gone = async move { gone.await.unwrap_or_default() };
-        ReadStep::Retiring(Some(Box::pin(effect(retired))), Box::pin(gone))
-    }
 }
 
 /// Waits until a request to the registry has taken effect.
-async fn effect(handled: impl Future<Output = Result<Handled, MailboxError>>) {
+pub(super) async fn effect(handled: impl Future<Output = Result<Handled, MailboxError>>) {
     if let Ok(handled) = handled.await {
         handled.effect().await;
     }

@@ -14,7 +14,7 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
 
 use crate::actors::gateway::limits::{READ_BYTES, WRITE_BYTES, WRITE_FRAMES};
 use crate::protocol::limits::MEDIUM;
-use crate::protocol::wire::frame::{FrameError, FramePart, FrameReader};
+use crate::protocol::wire::frame::{FramePart, FrameReader};
 use crate::protocol::wire::websocket::{SocketEnd, WebSocket};
 
 /// Why a client can no longer be read.
@@ -117,14 +117,6 @@ impl<S: ClientStream> Transport<S> {
             Protocol::WebSocket(socket, _) => socket.incoming.buffered(),
         };
         buffered > MEDIUM && self.is_unfinished()
-    }
-
-    /// Ends the stream. An incomplete frame is an error.
-    pub(super) fn finish(&mut self) -> Option<FrameError> {
-        match &mut self.protocol {
-            Protocol::Plain(frames) => frames.finish(),
-            Protocol::WebSocket(..) => None,
-        }
     }
 
     // ---- sending ----------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ use bytes::{Bytes, BytesMut};
 use super::client::Connection;
 use super::transport::{ClientLost, ClientStream, Protocol, Transport, write_some};
 use crate::actors::gateway::limits::FRAMES_IN_A_ROW;
+use crate::protocol::wire::frame::FrameError;
 use crate::protocol::wire::websocket::{SocketEnd, WebSocket};
 
 impl<S: ClientStream> Connection<S> {
@@ -50,6 +51,14 @@ impl<S: ClientStream> Transport<S> {
         match &self.protocol {
             Protocol::Plain(_) => 0,
             Protocol::WebSocket(socket, _) => socket.incoming.waiting(),
+        }
+    }
+
+    /// Ends the stream. An incomplete frame is an error.
+    pub(super) fn finish(&mut self) -> Option<FrameError> {
+        match &mut self.protocol {
+            Protocol::Plain(frames) => frames.finish(),
+            Protocol::WebSocket(..) => None,
         }
     }
 
