@@ -56,12 +56,14 @@ pub trait Answered: Callable {
 /// A request with its valid fields and its rejections. An invalid field never prevents a valid one from taking effect.
 pub trait FieldByField: Ask + Sized {
     /// The request with the valid fields and the rejections.
-    fn of(fields: &mut Fields<'_>) -> Self;
+    fn from_fields(fields: &mut Fields<'_>) -> Self;
 }
 
 impl<A: FieldByField> Callable for A {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        Ok(Self::of(&mut Fields::read_or_none(arguments, service)))
+        Ok(Self::from_fields(&mut Fields::read_or_none(
+            arguments, service,
+        )))
     }
 }
 

@@ -187,7 +187,7 @@ impl Outbox {
     }
 
     /// Records that the next `bytes` of the taken frames have been written.
-    pub fn written(&mut self, mut bytes: usize) {
+    pub fn note_written(&mut self, mut bytes: usize) {
         while let Some(frame) = self.writing.front_mut() {
             let done = bytes.min(frame.rest.len());
             frame.rest.advance(done);

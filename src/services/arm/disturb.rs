@@ -38,7 +38,7 @@ impl<const N: usize> Ask for Disturb<N> {
 }
 
 impl<const N: usize> FieldByField for Disturb<N> {
-    fn of(fields: &mut Fields<'_>) -> Self {
+    fn from_fields(fields: &mut Fields<'_>) -> Self {
         Self {
             effort: fields.array("effort", Bound::Finite),
             duration: fields.number("duration", Bound::Positive),

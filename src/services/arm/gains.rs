@@ -39,7 +39,7 @@ impl<const N: usize> Ask for SetGains<N> {
 }
 
 impl<const N: usize> FieldByField for SetGains<N> {
-    fn of(fields: &mut Fields<'_>) -> Self {
+    fn from_fields(fields: &mut Fields<'_>) -> Self {
         Self {
             kp: fields.array("kp", Bound::NonNegative),
             ki: fields.array("ki", Bound::NonNegative),

@@ -34,7 +34,7 @@ impl Ask for SetIntegrator {
 }
 
 impl FieldByField for SetIntegrator {
-    fn of(fields: &mut Fields<'_>) -> Self {
+    fn from_fields(fields: &mut Fields<'_>) -> Self {
         Self {
             method: fields.choice("method", &Method::ALL, Method::name),
             timestep: fields.number("timestep", Bound::Positive),

@@ -234,10 +234,10 @@ fn change<const N: usize>(
     let (service, field) = parameter.field().ok_or(NotSet::Derived)?;
     let fields = &mut Fields::single(service, field, Some(value));
     Ok(match service {
-        Service::SetParams => ParameterChange::Params(SetParams::of(fields)),
-        Service::SetGains => ParameterChange::Gains(SetGains::of(fields)),
-        Service::SetPeriod => ParameterChange::Period(SetPeriod::of(fields)),
-        _ => ParameterChange::Integrator(SetIntegrator::of(fields)),
+        Service::SetParams => ParameterChange::Params(SetParams::from_fields(fields)),
+        Service::SetGains => ParameterChange::Gains(SetGains::from_fields(fields)),
+        Service::SetPeriod => ParameterChange::Period(SetPeriod::from_fields(fields)),
+        _ => ParameterChange::Integrator(SetIntegrator::from_fields(fields)),
     })
 }
 

@@ -34,7 +34,7 @@ impl Ask for SetPeriod {
 }
 
 impl FieldByField for SetPeriod {
-    fn of(fields: &mut Fields<'_>) -> Self {
+    fn from_fields(fields: &mut Fields<'_>) -> Self {
         Self {
             period: fields.number("period", Bound::NonNegative),
             delay: fields.boolean("delay"),

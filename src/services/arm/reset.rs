@@ -21,7 +21,7 @@ impl<const N: usize> Ask for Reset<N> {
 }
 
 impl<const N: usize> FieldByField for Reset<N> {
-    fn of(fields: &mut Fields<'_>) -> Self {
+    fn from_fields(fields: &mut Fields<'_>) -> Self {
         Self {
             rejected: fields.rejections(),
         }

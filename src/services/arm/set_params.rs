@@ -41,7 +41,7 @@ impl<const N: usize> Ask for SetParams<N> {
 }
 
 impl<const N: usize> FieldByField for SetParams<N> {
-    fn of(fields: &mut Fields<'_>) -> Self {
+    fn from_fields(fields: &mut Fields<'_>) -> Self {
         Self {
             gravity: fields.number("gravity", Bound::NonNegative),
             masses: fields.array("masses", Bound::Positive),

@@ -25,7 +25,7 @@ impl<const N: usize> Ask for SetState<N> {
 }
 
 impl<const N: usize> FieldByField for SetState<N> {
-    fn of(fields: &mut Fields<'_>) -> Self {
+    fn from_fields(fields: &mut Fields<'_>) -> Self {
         Self {
             position: fields.array("position", Bound::Finite),
             velocity: fields.array("velocity", Bound::Finite),

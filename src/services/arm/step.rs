@@ -62,7 +62,7 @@ impl<const N: usize> Ask for Step<N> {
 }
 
 impl<const N: usize> FieldByField for Step<N> {
-    fn of(fields: &mut Fields<'_>) -> Self {
+    fn from_fields(fields: &mut Fields<'_>) -> Self {
         Self {
             steps: fields.count("steps", 1..=MAX_STEPS),
             effort: fields.array("effort", Bound::Finite),

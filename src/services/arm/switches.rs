@@ -33,7 +33,7 @@ impl Ask for Pause {
 }
 
 impl FieldByField for Pause {
-    fn of(fields: &mut Fields<'_>) -> Self {
+    fn from_fields(fields: &mut Fields<'_>) -> Self {
         Self {
             paused: fields.boolean("data"),
             rejected: fields.rejections(),
@@ -61,7 +61,7 @@ impl Ask for Enable {
 }
 
 impl FieldByField for Enable {
-    fn of(fields: &mut Fields<'_>) -> Self {
+    fn from_fields(fields: &mut Fields<'_>) -> Self {
         Self {
             enabled: fields.boolean("data"),
             rejected: fields.rejections(),

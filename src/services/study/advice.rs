@@ -97,7 +97,7 @@ impl<const N: usize> Callable for SuggestGains<N> {
             margin: fields.number("margin", Bound::Finite),
             timestep: fields.number("timestep", Bound::Positive),
             method: fields.choice("integrator", &Method::ALL, Method::name),
-            params: fields.object("params", SetParams::of),
+            params: fields.object("params", SetParams::from_fields),
         };
         if let Some(margin) = ask.margin.filter(|margin| *margin < 1.0) {
             fields.refuse("margin", &format_args!("must be at least 1, got {margin}"));
@@ -140,8 +140,8 @@ impl<const N: usize> Callable for PlanRun<N> {
             controller: fields.boolean("controller").unwrap_or(false),
             q0: fields.array("q0", Bound::Finite),
             qdot0: fields.array("qdot0", Bound::Finite),
-            params: fields.object("params", SetParams::of),
-            gains: fields.object("gains", SetGains::of),
+            params: fields.object("params", SetParams::from_fields),
+            gains: fields.object("gains", SetGains::from_fields),
             setpoint: fields.array("setpoint", Bound::Finite),
             control_period: fields.number("control_period", Bound::NonNegative),
         };

@@ -65,8 +65,8 @@ impl<const N: usize> Callable for PredictStability<N> {
         let mut fields = Fields::read(arguments, service)?;
         let ask = Self {
             method: fields.choice("integrator", &Method::ALL, Method::name),
-            gains: fields.object("gains", SetGains::of),
-            params: fields.object("params", SetParams::of),
+            gains: fields.object("gains", SetGains::from_fields),
+            params: fields.object("params", SetParams::from_fields),
             setpoint: fields.array("setpoint", Bound::Finite),
             control_period: fields.number("control_period", Bound::NonNegative),
         };

@@ -16,7 +16,7 @@ fn short_responses_count_by_themselves() {
     assert_eq!(bench.outbox.response_bytes(), SHORT + 5);
     bench.take(2, usize::MAX);
     for (written, short, all) in [(3, 1, SHORT + 2), (10, 0, SHORT - 8)] {
-        bench.outbox.written(written);
+        bench.outbox.note_written(written);
         let found = (bench.outbox.short_bytes(), bench.outbox.response_bytes());
         assert_eq!(found, (short, all));
     }
@@ -32,9 +32,9 @@ fn a_long_message_is_there_until_its_last_byte_has_been_written() {
     bench.push("/a", vec![b'x'; MEDIUM + 1]);
     assert!(bench.outbox.has_long());
     bench.take(2, usize::MAX);
-    bench.outbox.written(2 * MEDIUM + 1);
+    bench.outbox.note_written(2 * MEDIUM + 1);
     assert!(bench.outbox.has_long());
-    bench.outbox.written(1);
+    bench.outbox.note_written(1);
     assert!(!bench.outbox.has_long());
     // It is not held back for longer than 20 s. The first message is not held back.
     let long = MEDIUM + 1;

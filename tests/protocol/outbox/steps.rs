@@ -116,7 +116,7 @@ fn play(bench: &mut Bench, step: &'static str) {
             let taken = bench.take(usize::MAX, bytes.parse().unwrap_or(usize::MAX));
             assert_eq!(taken.join(&b","[..]), frames.as_bytes());
         }
-        "w" => bench.outbox.written(rest.parse().unwrap()),
+        "w" => bench.outbox.note_written(rest.parse().unwrap()),
         "%" => assert_eq!(bench.outbox.topic_count().to_string(), rest),
         "?" => {
             let due = (!rest.is_empty())

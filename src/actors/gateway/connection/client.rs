@@ -174,7 +174,7 @@ impl<S: ClientStream> Connection<S> {
         self.progress = Instant::now();
         self.flow.note_written(bytes, self.progress.into_std());
         let before = self.outbox.short_bytes();
-        self.outbox.written(bytes);
+        self.outbox.note_written(bytes);
         let written = before - self.outbox.short_bytes();
         if written > 0 {
             self.backlog.fetch_sub(written, Ordering::Relaxed);
