@@ -1,4 +1,5 @@
-//! The frames of a client that are long or come in pieces. A long frame is parsed on a worker thread.
+//! The frames of a client that are long or come in pieces. A long frame, of more than [`SHORT_WORK`] bytes, is parsed
+//! on a worker thread.
 //!
 //! **Invariant:** a client has at most one memory permit for its frames. It keeps the permit while its pieces take more
 //! than [`SHORT`] bytes.
@@ -12,6 +13,8 @@ use crate::protocol::op::{self, Incoming, Op, OpError, Problem};
 use crate::protocol::wire::fragments::Fragments;
 use crate::protocol::wire::frame::RawFrame;
 
+const _: () = assert!(SHORT_WORK <= SHORT, "a short frame needs no permit");
+
 const NESTED_FRAGMENT: &str = "fragment: the joined pieces must not be a fragment";
 
 /// A frame that cannot be performed at once.
@@ -22,7 +25,8 @@ pub enum LongFrame {
     Piece(Incoming, usize),
 }
 
-/// The op of a frame, or the frame's error, and the length of the frame. A piece of a message and white space have none.
+/// The op of a frame, or the frame's error, and the length of the frame. A piece of a message and white space have
+/// none.
 pub type Parsed = Result<Option<(Incoming, usize)>, &'static str>;
 
 /// The input that a client keeps in memory between its frames.

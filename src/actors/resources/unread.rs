@@ -1,5 +1,5 @@
-//! The system's description of a client's socket on the same machine: its unread bytes, and whether the client has closed
-//! it.
+//! The system's description of a client's socket on the same machine: its unread bytes, and whether the client has
+//! closed it.
 //!
 //! Linux describes one socket in some microseconds by `NETLINK_SOCK_DIAG` (`man 7 sock_diag`). Other systems do not.
 //!
@@ -66,7 +66,7 @@ fn unread(ends: Ends) -> Option<usize> {
 }
 
 /// Ends when the client has closed its socket, if it is on this machine: the socket belongs to no program any more. A
-/// client that has only stopped sending may still read.
+/// client that has only stopped sending may still read. For a client on another machine it never ends.
 pub async fn closed(ends: Ends) {
     while value(ends.peer, ends.local, INODE) != Some(0) {
         sleep(CLOSED_CHECK).await;

@@ -5,23 +5,22 @@
 //!
 //! **Invariant:** one frame is one line of valid JSON.
 
-mod answers;
+mod frames;
 pub mod scene;
 mod telemetry;
 
 use bytes::Bytes;
 use serde::Serialize;
 
-pub use self::answers::{
+pub use self::frames::{
     Empty, ErrorForm, Level, action_feedback, action_goal, action_result, call, cancellation,
-    failure, publish, response, status,
+    failure, message_text, publish, respelled, status,
 };
 pub use self::telemetry::{
     Clock, DiagnosticArray, DiagnosticStatus, ErrorEstimateMessage, Header, JointState, KeyValue,
     Stamp,
 };
 use crate::protocol::wire::json::Payload;
-use crate::protocol::wire::lines;
 
 /// Initial capacity of a frame. The state of a 3-link arm and every status fit.
 const USUAL_FRAME: usize = 512;
@@ -35,33 +34,23 @@ pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
         .end()
 }
 
-/// A frame of [`publish`] for `topic`, or a [series](lines) of them, rewritten for subscribers with another spelling of
-/// the name.
+/// The answer to a service call. `values` is an object. `reason` becomes its `status`, and is empty on success. `values`
+/// of another client are forwarded.
 #[must_use]
-pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
-    if topic == spelling {
-        return frames.clone();
-    }
-    let mut text = Vec::with_capacity(frames.len());
-    for frame in lines::messages(frames.clone()) {
-        let mut line = Encoder::after(text, "publish").value("topic", spelling);
-        line.key("msg");
-        line.text.extend_from_slice(message_text(topic, &frame));
-        line.text.extend_from_slice(b"}\n");
-        text = line.text;
-    }
-    text.shrink_to_fit();
-    Bytes::from(text)
-}
-
-/// The message in a frame of [`publish`] for `topic`, as JSON.
-#[must_use]
-pub fn message_text<'a>(topic: &str, frame: &'a [u8]) -> &'a [u8] {
-    let quoted = serde_json::to_string(topic).map_or(0, |quoted| quoted.len());
-    let head = "{\"op\":\"publish\",\"topic\":,\"msg\":".len() + quoted;
-    let msg = frame.get(head..frame.len().saturating_sub("}\n".len()));
-    debug_assert!(msg.is_some(), "{topic} is not what this frame is about");
-    msg.unwrap_or(b"null")
+pub fn response(
+    service: &str,
+    id: Option<&Payload>,
+    values: &impl Serialize,
+    result: bool,
+    reason: &str,
+) -> Bytes {
+    Encoder::op("service_response")
+        .value("service", service)
+        .optional("id", id)
+        .value("values", values)
+        .value("result", &result)
+        .value("status", reason)
+        .end()
 }
 
 /// A frame under construction. Its members are in the order of the calls.
@@ -105,6 +94,13 @@ impl Encoder {
             self.text.extend_from_slice(b"null");
         }
         self
+    }
+
+    fn optional<T: Serialize + ?Sized>(self, key: &str, value: Option<&T>) -> Self {
+        match value {
+            Some(value) => self.value(key, value),
+            None => self,
+        }
     }
 
     fn end(mut self) -> Bytes {

@@ -1,5 +1,4 @@
-//! Reads the operations that carry no message and no request: registrations, subscriptions, levels of statuses, tokens,
-//! and pieces of longer frames.
+//! Reads every operation except published messages, calls and goals. `providers.rs` reads those of clients that serve.
 //!
 //! **Invariant:** every number is within its limit, and a binary encoding has no fragment size.
 
@@ -17,7 +16,7 @@ use crate::protocol::wire::fragments::Piece;
 use crate::protocol::wire::json::{self, Payload};
 
 impl<'a> Members<'a> {
-    /// Any operation but a published message, a call or a goal.
+    /// Any operation except a published message, a call or a goal.
     pub(super) fn other(&self) -> Result<Op, Problem> {
         Ok(match self.op {
             "advertise" => Op::Advertise {
@@ -135,7 +134,7 @@ impl<'a> Members<'a> {
     fn piece(&self) -> Result<Piece, Problem> {
         let id = self.required("id")?;
         self.short("id", id.get())?;
-        // A number that does not fit is refused as too large below.
+        // `Fragments::take` refuses a number that does not fit.
         let index = |field| {
             let number = self.typed(field, "an integer, at least 0", json::integer)?;
             Ok(usize::try_from(number).unwrap_or(usize::MAX))

@@ -1,5 +1,5 @@
-//! Reads goals, and the operations of clients that serve a service or an action. Also reads
-//! frames with a fault, because such a frame may be an answer.
+//! Reads goals, and the operations of clients that serve a service or an action. Also reads frames with a fault,
+//! because such a frame may be an answer.
 //!
 //! **Invariant:** an answer has the `id` of its call or goal. A bad answer names its call or goal, if it
 //! has an `id` or the name.
@@ -13,7 +13,8 @@ use super::{A_NAME, Incoming, Members, Op, OpError, Problem};
 use crate::protocol::wire::json::{self, Payload};
 
 impl Incoming {
-    /// Reads the start of a frame that is refused for the reason `why`. It may be the answer to a call, which then fails.
+    /// Reads the start of a frame that is refused for the reason `why`. It may be the answer to a call, which then
+    /// fails.
     #[must_use]
     pub fn of_start(start: &[u8], why: &impl ToString) -> Self {
         let text = start.utf8_chunks().next();
@@ -124,8 +125,8 @@ impl Members<'_> {
         }))
     }
 
-    /// A fault of a call or a goal. Its answer needs the name of the service or action, which may be empty or too long.
-    /// Without a text there, the fault is that.
+    /// A fault of a call or a goal. The answer needs the name of the service or action, even an empty or too long one.
+    /// If the name is not a text, this is reported instead.
     pub(super) fn fault(&self, kind: Served, problem: Problem) -> OpError {
         let name = match self.typed(kind.noun(), A_NAME, json::text) {
             Ok(name) => name.into_owned(),

@@ -15,7 +15,7 @@ pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
 /// fewer than 40.
 pub const MAX_QUEUE_LENGTH: usize = 100_000;
 
-/// A finite number of seconds as a duration of at most `longest`, which a negative number gives too.
+/// A finite number of seconds as a duration of at most `longest`. A negative number gives `longest`.
 pub(super) fn duration(seconds: f64, longest: Duration) -> Duration {
     Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
 }

@@ -1,4 +1,4 @@
-//! What waits in an outbox: the numbers and bytes of its messages, and a check of these sums.
+//! The numbers and bytes of the messages in an outbox, and a check of these sums.
 //!
 //! **Invariant:** the sums are those of the messages that wait, after every change.
 
@@ -47,7 +47,7 @@ impl Outbox {
         self.dropped
     }
 
-    /// Compares the sums with the messages that they are of. Builds without debug assertions omit it.
+    /// Compares the sums with the messages. Builds without debug assertions omit it.
     pub(super) fn check_sums(&self) {
         if !cfg!(debug_assertions) {
             return;

@@ -1,4 +1,5 @@
-//! Throttled topics: which messages are held back, and when they enter the queue.
+//! Throttled topics: which messages are held back, and when they enter the queue. Also `queue_length`, and feedback of
+//! goals, which is never held.
 //!
 //! **Invariant:** a held message gets its place in the queue when it is released.
 

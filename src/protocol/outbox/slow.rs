@@ -27,8 +27,9 @@ pub(super) struct SlowClient {
 }
 
 impl SlowClient {
-    /// Bytes that may be written now, if the client is slow. It has read `read` bytes so far. The oldest of its `unread`
-    /// bytes has this age.
+    /// Bytes that may be written now. `None` if the client is not slow. It has read `read` bytes so far. The oldest of
+    /// its
+    /// `unread` bytes has the age `age`.
     pub(super) fn room(
         &mut self,
         now: Instant,

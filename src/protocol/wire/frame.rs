@@ -53,7 +53,7 @@ pub struct FrameReader {
     /// How far the buffer has been scanned.
     pub(super) at: usize,
     pub(super) state: ScanState,
-    pub(super) nesting: Nesting,
+    nesting: Nesting,
     /// Longest frame.
     pub(super) limit: usize,
 }
@@ -178,7 +178,7 @@ impl FrameReader {
         }
     }
 
-    /// Scans on in an object, up to its end or a fault.
+    /// Continues the scan of an object, up to its end or a fault.
     pub(super) fn scan(&mut self) -> Option<ObjectEnd> {
         let rest = self.buffer.get(self.at..).unwrap_or_default();
         let (scanned, end) = self.nesting.scan(rest);
@@ -227,7 +227,7 @@ impl FrameReader {
             }
             if self.at == self.buffer.len() {
                 if self.start == self.at {
-                    // A long frame has been returned.
+                    // Nothing is left. The memory of a long frame is freed.
                     self.compact();
                     self.buffer.shrink_to(KEPT_BUFFER);
                 }
@@ -273,8 +273,7 @@ impl RawFrame {
         self.newline
     }
 
-    /// The text, with `NaN` and its like made [acceptable](accept_literals). `None` for a message that has only white
-    /// space.
+    /// The text, with `NaN` and `Infinity` [replaced](accept_literals). `None` for a message that has only white space.
     ///
     /// # Errors
     /// If it is not one object in UTF-8, with its first bytes.

@@ -7,7 +7,7 @@ use bytes::Bytes;
 use super::series::{HEAD, MAX_SERIES};
 
 /// The length of the first message of frames for one client: one line of a series, or all of anything else
-/// (fragments, binary, or more bytes than a series has). The time does not depend on the length of the message.
+/// (fragments, binary, or more bytes than a series has). Only up to 64 KiB are searched.
 #[must_use]
 pub fn first_message(frames: &[u8]) -> usize {
     first_messages(frames, 0).0

@@ -1,5 +1,5 @@
-//! Numbers that are not finite, in JSON text: `NaN` and its like become literals in the input, and literals that overflow
-//! become `null` in the output.
+//! Numbers that are not finite, in JSON text. In the input, `NaN` and `Infinity` become numbers that overflow. In the
+//! output, numbers that overflow become `null`.
 //!
 //! **Invariant:** one pass, linear in the length of any text. Strings do not change.
 
@@ -8,9 +8,9 @@ use std::cmp::Ordering;
 use std::iter::repeat;
 
 /// The text that replaces `NaN` in the input. It is read as infinity, because no valid input distinguishes the two.
-pub(crate) const NAN: &str = "9e999";
+pub(super) const NAN: &str = "9e999";
 /// The text that replaces `Infinity` in the input. The sign before it stays.
-pub(crate) const INFINITY: &str = "1e999";
+pub(super) const INFINITY: &str = "1e999";
 /// Digits of the largest finite `f64` before the point. A shorter number without an exponent cannot overflow.
 const SAFE_DIGITS: usize = OVERFLOW.len() - 1;
 /// The least number that rounds to infinity: 2^1024 - 2^970, halfway between the largest `f64` and the next power of
@@ -125,8 +125,8 @@ fn whole(length: usize) -> i64 {
 
 // ---- tokens outside strings -----------------------------------------------------------------------------------------
 
-/// The text with other tokens outside strings; `None` if nothing changes. `token` returns the end of the token at a byte
-/// that `begins` accepts, and what replaces it.
+/// The text with other tokens outside strings; `None` if nothing changes. `token` returns the end of the token at a
+/// byte that `begins` accepts, and what replaces it.
 fn replaced(
     text: &str,
     begins: impl Fn(u8) -> bool,

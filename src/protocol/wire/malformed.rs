@@ -1,10 +1,11 @@
-//! Parts of a stream that are not frames: lines that are not objects, objects with a fault, and an incomplete end. As an
-//! iterator, a reader returns its decoded frames and these faults, in order.
+//! Parts of a stream that are not frames: lines that are not objects, objects with a fault, and an incomplete end. As
+//! an iterator, a reader returns its decoded frames and these faults, in order.
 //!
-//! An object with a fault is skipped to its end, or to the newline if its brackets do not match. A line is skipped to the
-//! newline.
+//! An object with a fault is skipped to its end, or to the newline if its brackets do not match. A line is skipped to
+//! the newline.
 //!
-//! **Invariant:** each part is reported once, as soon as its fault is known, and no byte after that is kept.
+//! **Invariant:** each part is reported once: an object at its fault, a line after its first bytes. No byte after that
+//! is kept.
 
 use super::fault::{FrameError, MAX_PREFIX, Refused, not_an_object, start_of};
 use super::frame::{FrameReader, ObjectEnd, ScanState};

@@ -1,8 +1,8 @@
 //! Values in JSON input, lenient about numbers.
 //!
 //! Python's `json` writes `NaN`, `Infinity` and `-Infinity`, and any client may write `1e999`. In the input, these
-//! names become literals that overflow. So the parser accepts the frame, [`number`] returns a non-finite value, and the
-//! field's reader rejects it by name.
+//! names become literals that overflow (`literals.rs`). So the parser accepts the frame, [`number`] returns a
+//! non-finite value, and the field's reader rejects it by name.
 //!
 //! **Invariant:** one pass, linear in the length of any text.
 

@@ -1,8 +1,8 @@
 //! Frames of a WebSocket (RFC 6455, section 5): bytes into messages, and back. The result of reading does not depend on
 //! how the stream is divided into chunks.
 //!
-//! A message longer than the limit becomes one error, and the rest of it is skipped. Only the latest ping is answered, as
-//! section 5.5.3 allows. A close frame is answered with the same code.
+//! A message longer than the limit becomes one error, and the rest of it is skipped. Only the latest ping is answered,
+//! as section 5.5.3 allows. A close frame is answered with the same code.
 //!
 //! **Invariant:** at most one incomplete message, the last chunk and the messages read ahead are kept. The output has
 //! at most one part of the messages, one pong and one close frame.
@@ -293,7 +293,7 @@ fn unmask(payload: &mut [u8], mask: &mut [u8; 4]) {
 // ---- a message, which is one object ---------------------------------------------------------------------------------
 
 impl RawFrame {
-    /// A message of a WebSocket or of pieces, which may be pretty-printed.
+    /// A message that came over WebSocket or in pieces. It may be pretty-printed.
     #[must_use]
     pub const fn of_message(bytes: Vec<u8>) -> Self {
         Self {
@@ -478,8 +478,8 @@ fn kind_of(message: &[u8]) -> u8 {
     }
 }
 
-/// The part of `bytes` that fits into one frame, the number of `bytes` that it takes, and whether a message ends there. A
-/// text may be several messages, one per line. The end of a line is not sent.
+/// The part of `bytes` that fits into one frame, the number of `bytes` that it takes, and whether a message ends there.
+/// A text may be several messages, one per line. The end of a line is not sent.
 fn first_piece(bytes: &[u8], is_text: bool, room: usize) -> (&[u8], usize, bool) {
     let offered = bytes.get(..room).unwrap_or(bytes);
     let end = || offered.iter().position(|&byte| byte == b'\n');

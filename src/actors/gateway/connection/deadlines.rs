@@ -1,7 +1,7 @@
-//! A client that is slow, stops or is refused: the waits for it, and their deadlines.
+//! Waits for a client that is slow, has stopped sending or is refused, and their deadlines.
 //!
-//! **Invariant:** the waits for the rest of a frame, for a client that reads nothing, and for the end of its stream have
-//! deadlines.
+//! **Invariant:** the waits for the rest of a frame, for a client that reads nothing, and for the end of its stream
+//! have deadlines.
 
 use std::pin::Pin;
 use std::sync::atomic::Ordering;

@@ -52,7 +52,8 @@ impl<S: ClientStream> Connection<S> {
         Self::start_with(None, admission, ends, stream, registry, gauges)
     }
 
-    /// Starts the actor for a client that must be admitted. `unread` returns its unread bytes instead of the system.
+    /// Starts the actor for a client that must be admitted. If `unread` is given, it returns the client's unread bytes.
+    /// Otherwise the system does.
     pub fn start_with(
         unread: Option<UnreadSource>,
         admission: Arc<Admission>,
@@ -97,6 +98,7 @@ impl<S: ClientStream> Connection<S> {
             }
             Err(status) => {
                 self.refuse_with(status);
+                self.is_finishing = true;
                 Box::pin(wrap_future(ready(())))
             }
         };

@@ -39,7 +39,7 @@ type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 pub(super) struct ClientReader {
     step: ReadStep,
     pub(super) id: ConnectionId,
-    /// Pieces of a message and the memory permit. While a long frame is parsed, its future owns them.
+    /// Pieces of a message and the memory permit. While a long frame or a piece is read, its future owns them.
     pub(super) long: LongFrames,
     /// Received bytes that the transport has not read yet.
     pub(super) chunk: BytesMut,
@@ -83,7 +83,7 @@ pub(super) enum ReadStep {
 impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
     type Output = ();
 
-    /// Reads until the client ends or is refused, then lets the connection finish.
+    /// Reads until the client ends or is refused.
     fn poll(
         self: Pin<&mut Self>,
         client: &mut Connection<S>,

@@ -1,4 +1,5 @@
-//! The WebSocket of a client: its messages, the answers to pings, and its close. A message is a frame.
+//! The WebSocket of a client: its messages, the answers to pings, and its close. A message is a frame. Also the end of
+//! a stream, for both transports.
 //!
 //! **Invariant:** a peer that has closed gets only a close frame. At most one write and one pong wait to be written.
 
@@ -16,8 +17,8 @@ use crate::protocol::wire::frame::FrameError;
 use crate::protocol::wire::websocket::{SocketEnd, WebSocket};
 
 impl<S: ClientStream> Connection<S> {
-    /// Whether the client is served over WebSocket. Its frames are messages, which may be binary, and it answers the end
-    /// of the connection.
+    /// Whether the client is served over WebSocket. Then its frames are messages, which may be binary, and it answers
+    /// the close frame.
     pub(super) fn is_socket(&self) -> bool {
         let protocol = self.transport.as_ref().map(|transport| &transport.protocol);
         matches!(protocol, Some(Protocol::WebSocket(..)))
@@ -73,8 +74,8 @@ impl<S: ClientStream> Transport<S> {
         }
     }
 
-    /// Sends a part of `frames`. Returns their number of bytes, once that part is sent. A peer that has closed gets only a
-    /// close frame.
+    /// Sends a part of `frames`. Returns their number of bytes, once that part is sent. A peer that has closed gets
+    /// only a close frame.
     pub(super) fn poll_messages<'a>(
         socket: &mut WebSocket,
         stream: &mut S,
@@ -117,8 +118,8 @@ impl<S: ClientStream> Transport<S> {
         Self::poll_output(socket, stream, cx)
     }
 
-    /// Closes the stream in an orderly way, after a close frame over WebSocket. The input of a refused peer is discarded,
-    /// including its close frame. The end of the stream is enough for it.
+    /// Closes the stream in an orderly way, after a close frame over WebSocket. The input of a refused peer is
+    /// discarded, including its close frame. The end of the stream is enough for it.
     pub(super) fn poll_end(
         &mut self,
         cx: &mut Context<'_>,

@@ -1,7 +1,7 @@
-//! Messages in the forms that subscribers requested: made once for all of them, then delivered. `actors/graph/forms.rs`
+//! Makes each requested form of a message once, and delivers it to all its subscribers. `actors/graph/forms.rs`
 //! encodes.
 //!
-//! **Invariant:** a long message is encoded on a worker thread and delays only its publisher.
+//! **Invariant:** a client's long message is encoded on a worker thread and delays only its publisher.
 
 use std::sync::Arc;
 
@@ -9,10 +9,10 @@ use actix::prelude::*;
 use bytes::Bytes;
 
 use super::publishing::deliver;
-use super::{Handled, Registry, Subscriber};
+use super::{Registry, Subscriber};
 use crate::actors::ConnectionId;
 use crate::actors::graph::forms::{Made, ToEncode};
-use crate::actors::node::{Done, guard};
+use crate::actors::node::Done;
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages;
@@ -30,16 +30,6 @@ impl Registry {
             fragmented: Arc::clone(&self.fragmented),
             permit: self.permit.clone(),
         }
-    }
-
-    /// Ends the delivery of a client's message. The client waits for the encoding of a long one.
-    pub(super) fn finish_delivery(&self, long: Vec<ToEncode>, ctx: &mut Context<Self>) -> Handled {
-        if long.is_empty() {
-            return Handled::at_once();
-        }
-        let (done, ended) = guard();
-        self.encode_on_worker(long, &done, ctx);
-        Handled::with(ended)
     }
 
     /// Encodes long messages on worker threads, and delivers them.
@@ -80,7 +70,7 @@ impl Registry {
     }
 
     /// Delivers the messages of a form. Messages that could not be made count as dropped.
-    pub(super) fn deliver_form(&self, subscriber: &Subscriber, made: &Made) {
+    fn deliver_form(&self, subscriber: &Subscriber, made: &Made) {
         self.gauges.add_dropped(made.lost);
         for frame in &made.messages {
             deliver(subscriber, frame.clone());

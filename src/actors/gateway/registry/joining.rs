@@ -1,6 +1,7 @@
-//! Clients join and leave, and so do the nodes.
+//! Clients join and leave. Also the other requests of the runtime and its nodes.
 //!
-//! **Invariant:** a client has one entry from [`Connect`] to [`Disconnect`]. Its registrations end when it stops sending.
+//! **Invariant:** a client has one entry from [`Connect`] to [`Disconnect`]. Its registrations end when it stops
+//! sending.
 
 use std::collections::HashSet;
 use std::net::IpAddr;

@@ -1,6 +1,6 @@
 //! The registry has every client, topic and service. It fans messages out to subscribers, and routes calls.
 //!
-//! This file has its state, its messages and the path of an op. `joining.rs` has the clients that come and go,
+//! This file has its state, its messages and the path of an op. `joining.rs` has the clients that join and leave,
 //! `subscriptions.rs`, `publishing.rs` and `requests.rs` the rosbridge ops, `forms.rs` the messages that are encoded in
 //! another form, and `actors/graph/` the tables.
 //!

@@ -119,6 +119,16 @@ impl Registry {
         }
         long
     }
+
+    /// Ends the delivery of a client's message. The client waits for the encoding of a long one.
+    fn finish_delivery(&self, long: Vec<ToEncode>, ctx: &mut Context<Self>) -> Handled {
+        if long.is_empty() {
+            return Handled::at_once();
+        }
+        let (done, ended) = guard();
+        self.encode_on_worker(long, &done, ctx);
+        Handled::with(ended)
+    }
 }
 
 impl Handler<Publish> for Registry {
@@ -153,7 +163,7 @@ impl Handler<Publish> for Registry {
     }
 }
 
-/// Sends a frame of the topic to its connection.
+/// Sends a frame to the subscriber's connection.
 pub(super) fn deliver(subscriber: &Subscriber, frame: Bytes) {
     let topic = Some(Arc::clone(&subscriber.spelling));
     subscriber

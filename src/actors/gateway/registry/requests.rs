@@ -1,4 +1,5 @@
-//! Routes calls and goals to the node or client that serves them, and answers back to the callers. Refuses ops.
+//! Routes calls and goals to the node or client that serves them, and routes answers back. Sends clients their
+//! responses, statuses and refusals.
 //!
 //! **Invariant:** every call has one response. Every goal has one `action_result`, unless its sender disconnects first.
 
@@ -164,7 +165,8 @@ impl Registry {
         })
     }
 
-    /// Cancels the client's goal with this id, or all goals, at the node that serves the action. `None` if no node does.
+    /// Cancels the client's goal with this id, or all goals, at the node that serves the action. `None` if no node
+    /// does.
     fn cancel_at_node(
         &self,
         origin: &FrameOrigin,
@@ -196,8 +198,8 @@ impl Registry {
         (is_known && !has(Served::Service, service)).then_some(action)
     }
 
-    /// Cancels all goals of an action, also those of other clients, as the service of ROS 2 does. The goals end after the
-    /// answer.
+    /// Cancels all goals of an action, also those of other clients, as the service of ROS 2 does. The goals end after
+    /// the answer.
     fn cancel_all_goals(
         &mut self,
         origin: &FrameOrigin,
@@ -384,8 +386,8 @@ impl Registry {
         Ok(())
     }
 
-    /// Forwards the cancellation of all goals of an action, as far as its server reads. If goals remain, the caller gets
-    /// a refusal and may call again.
+    /// Forwards the cancellation of all goals of an action, as far as its server reads. If goals remain, the caller
+    /// gets a refusal and may call again.
     fn forward_all_cancellations(&mut self, action: &str) -> Result<(), Refusal> {
         let provider = self
             .providers
@@ -481,7 +483,7 @@ impl Registry {
     }
 
     /// Ends a request without an answer. The caller gets the reason.
-    pub(super) fn fail(&self, request: &Forwarded, why: &Refusal) {
+    fn fail(&self, request: &Forwarded, why: &Refusal) {
         let origin = FrameOrigin {
             from: request.caller,
             id: request.id.clone(),
@@ -495,7 +497,7 @@ impl Registry {
     }
 
     /// Answers a call with `result: false` and the reason. `own` is the service, if a node of the runtime serves it.
-    pub(super) fn refuse_call(
+    fn refuse_call(
         &self,
         origin: &FrameOrigin,
         service: &str,
@@ -510,13 +512,7 @@ impl Registry {
     }
 
     /// Ends a goal that has no result, for this reason.
-    pub(super) fn end_goal(
-        &self,
-        origin: &FrameOrigin,
-        action: &str,
-        why: &impl Display,
-        status: GoalStatus,
-    ) {
+    fn end_goal(&self, origin: &FrameOrigin, action: &str, why: &impl Display, status: GoalStatus) {
         if let Some(client) = self.clients.get(&origin.from) {
             let (id, why) = (origin.id.as_ref(), why.to_string());
             let frame = messages::action_result(action, id, &why, status as u8, false);
@@ -525,7 +521,7 @@ impl Registry {
     }
 }
 
-// ---- what a client gets ---------------------------------------------------------------------------------------------
+// ---- frames to a client ---------------------------------------------------------------------------------------------
 
 impl Handler<Respond> for Registry {
     type Result = ();
@@ -554,12 +550,12 @@ impl Handler<Respond> for Registry {
 
 impl Client {
     /// Sends a status, a forwarded call or another client's response.
-    pub(super) fn send(&self, frame: Bytes) {
+    fn send(&self, frame: Bytes) {
         self.respond(frame, None);
     }
 
     /// Sends a response. `service` is the responding service, if it is the runtime's own.
-    pub(super) fn respond(&self, frame: Bytes, service: Option<Service>) {
+    fn respond(&self, frame: Bytes, service: Option<Service>) {
         if frame.len() <= SHORT {
             self.outlets
                 .backlog
@@ -570,7 +566,7 @@ impl Client {
     }
 
     /// Sends feedback of a goal. It may be dropped.
-    pub(super) fn deliver_feedback(&self, frame: Bytes) {
+    fn deliver_feedback(&self, frame: Bytes) {
         let topic = None;
         self.outlets
             .mailbox
@@ -578,12 +574,12 @@ impl Client {
     }
 
     /// Bytes of responses that wait to be written to it.
-    pub(super) fn backlog(&self) -> usize {
+    fn backlog(&self) -> usize {
         self.outlets.backlog.load(Ordering::Relaxed)
     }
 
     /// Whether its short responses wait beyond the limit. Then other clients' calls and answers to it are refused.
-    pub(super) fn is_congested(&self) -> bool {
+    fn is_congested(&self) -> bool {
         self.backlog() > MAX_BACKLOG
     }
 }

@@ -1,7 +1,7 @@
-//! Advertisements and subscriptions of clients.
+//! Advertisements and subscriptions of clients, and the tap of the recorder.
 //!
-//! **Invariant:** a refused op changes nothing. The node that publishes a topic is notified of its first subscriber and of
-//! the end of its last one.
+//! **Invariant:** a refused op changes nothing. The node that publishes a topic is notified of its first subscriber and
+//! of the end of its last one.
 
 use std::sync::Arc;
 
@@ -155,14 +155,14 @@ impl Registry {
     }
 
     /// Notes that the topic's last subscriber has gone.
-    pub(super) fn note_unwanted(&mut self, topic: &str) {
+    fn note_unwanted(&mut self, topic: &str) {
         if let Some(topic) = Topic::from_name(topic) {
             self.latched.remove(&topic);
         }
         self.notify_owner(topic, false);
     }
 
-    pub(super) fn notify_owner(&self, topic: &str, wanted: bool) {
+    fn notify_owner(&self, topic: &str, wanted: bool) {
         if let Some(topic) = Topic::from_name(topic)
             && let Some(owner) = self.nodes.publishers.get(&topic)
         {

@@ -1,13 +1,15 @@
-//! The frames that the runtime makes itself: messages of its nodes, responses, goals, statuses, and requests to clients.
+//! The other frames that the runtime makes: messages of its nodes, messages under another name, failures, goals,
+//! statuses, and requests to clients.
 //!
 //! **Invariant:** an answer has the `id` of its request, as its [`Payload`] writes it.
 
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::Encoder;
+use super::{Encoder, response};
 use crate::protocol::catalog::table;
 use crate::protocol::wire::json::Payload;
+use crate::protocol::wire::lines;
 
 table! {
     /// The severity of a status, the lowest first.
@@ -33,15 +35,6 @@ table! {
     }
 }
 
-impl Encoder {
-    fn optional<T: Serialize + ?Sized>(self, key: &str, value: Option<&T>) -> Self {
-        match value {
-            Some(value) => self.value(key, value),
-            None => self,
-        }
-    }
-}
-
 /// A message of a node on a topic.
 #[must_use]
 pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
@@ -51,23 +44,33 @@ pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
         .end()
 }
 
-/// The answer to a service call. `values` is an object, and `status` is empty on success. `values` of another client
-/// are forwarded.
+/// A frame of [`publish`] for `topic`, or a [series](crate::protocol::wire::series) of them, rewritten for subscribers
+/// with another spelling of the name.
 #[must_use]
-pub fn response(
-    service: &str,
-    id: Option<&Payload>,
-    values: &impl Serialize,
-    result: bool,
-    status: &str,
-) -> Bytes {
-    Encoder::op("service_response")
-        .value("service", service)
-        .optional("id", id)
-        .value("values", values)
-        .value("result", &result)
-        .value("status", status)
-        .end()
+pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
+    if topic == spelling {
+        return frames.clone();
+    }
+    let mut text = Vec::with_capacity(frames.len());
+    for frame in lines::messages(frames.clone()) {
+        let mut line = Encoder::after(text, "publish").value("topic", spelling);
+        line.key("msg");
+        line.text.extend_from_slice(message_text(topic, &frame));
+        line.text.extend_from_slice(b"}\n");
+        text = line.text;
+    }
+    text.shrink_to_fit();
+    Bytes::from(text)
+}
+
+/// The message in a frame of [`publish`] for `topic`, as JSON.
+#[must_use]
+pub fn message_text<'a>(topic: &str, frame: &'a [u8]) -> &'a [u8] {
+    let quoted = serde_json::to_string(topic).map_or(0, |quoted| quoted.len());
+    let head = "{\"op\":\"publish\",\"topic\":,\"msg\":".len() + quoted;
+    let msg = frame.get(head..frame.len().saturating_sub("}\n".len()));
+    debug_assert!(msg.is_some(), "{topic} is not what this frame is about");
+    msg.unwrap_or(b"null")
 }
 
 /// The answer to a failed call. `status` has the reason; `values` is `{}` or has the reason.
