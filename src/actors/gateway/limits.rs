@@ -60,8 +60,8 @@ pub const STALL_LIMIT: Duration = Duration::from_secs(20);
 /// timeout. The slowest line that can control an arm needs less.
 pub const FRAME_TIME: Duration = Duration::from_secs(60);
 /// Timeout of pending responses to a client that has stopped sending. It is longer than [`DEFAULT_TIMEOUT`]. The client
-/// may have disconnected, which is detected by sending to it, or by `CLOSED_CHECK` (`resources/unread.rs`) on
-/// the same machine.
+/// may have disconnected, which is detected by sending to it, or by `CLOSED_CHECK` (`resources/unread.rs`) on the
+/// same machine.
 pub const RESPONSES_TIME: Duration = Duration::from_secs(15);
 /// Most bytes of one read. It is enough for a burst of short frames.
 pub(super) const READ_BYTES: usize = 32 * KIB;

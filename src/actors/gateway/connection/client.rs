@@ -170,7 +170,7 @@ impl<S: ClientStream> Connection<S> {
 
     /// Notes that `bytes` of the frames were written. Returns whether that allows the client to be read again.
     fn note_written(&mut self, bytes: usize) -> bool {
-        let (may_read, may_compute) = (self.may_read(), self.may_compute());
+        let may_read = self.may_read();
         self.progress = Instant::now();
         self.flow.note_written(bytes, self.progress.into_std());
         let before = self.outbox.short_bytes();
@@ -182,9 +182,7 @@ impl<S: ClientStream> Connection<S> {
         if self.outbox.response_bytes() == 0 {
             self.responses_since = None;
         }
-        if !may_compute {
-            self.start_computation();
-        }
+        self.start_computation();
         !may_read && self.may_read()
     }
 

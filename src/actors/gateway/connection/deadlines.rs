@@ -70,7 +70,7 @@ impl ClientReader {
     /// Waits until enough was written and computed that the client may be read. Meanwhile reads up to [`READ_BYTES`]
     /// bytes, to detect the end of the stream. Returns an error if the client has disconnected. A client that has ended
     /// its stream counts as disconnected if nothing was written for [`RESPONSES_TIME`].
-    pub(super) fn poll_blocked<S: ClientStream>(
+    pub(super) fn poll_may_read<S: ClientStream>(
         &mut self,
         client: &mut Connection<S>,
         cx: &mut task::Context<'_>,

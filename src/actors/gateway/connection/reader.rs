@@ -192,13 +192,9 @@ impl ClientReader {
         if self.frames >= FRAMES_IN_A_ROW {
             return end_turn(cx);
         }
-        if !client.may_read() || self.blocked.is_some() {
-            ready!(self.poll_blocked(client, cx))?;
-        }
+        ready!(self.poll_may_read(client, cx))?;
         let transport = client.transport()?;
-        if self.long.permit.is_some() {
-            self.long.give_back(transport.is_long_coming());
-        }
+        self.long.give_back(transport.is_long_coming());
         let part = transport.cut()?;
         let is_long_coming = transport.is_long_coming();
         if part.is_some() || !transport.is_unfinished() {
