@@ -166,23 +166,21 @@ impl<S: ClientStream> Connection<S> {
         self.outbox.is_writing()
     }
 
-    /// Notes that `bytes` of the frames were written. Returns whether that allows the client to be read again.
-    fn note_written(&mut self, bytes: usize, now: Instant) -> bool {
+    /// Notes that `bytes` of the frames were written.
+    fn note_written(&mut self, bytes: usize, now: Instant) {
         self.progress = now;
         self.flow.note_written(bytes, now.into_std());
         let (responses, short) = (self.outbox.response_bytes(), self.outbox.short_bytes());
         self.outbox.note_written(bytes);
         if self.outbox.response_bytes() == responses {
-            return false;
+            return;
         }
         let written = short - self.outbox.short_bytes();
         self.backlog.fetch_sub(written, Ordering::Relaxed);
         if self.outbox.response_bytes() == 0 {
             self.responses_since = None;
         }
-        let could_read = responses <= MAX_RESPONSES_WAITING && !self.computations.is_full();
         self.start_computation();
-        !could_read && self.may_read()
     }
 
     /// Whether the reader may go on: neither too many responses nor too many computations wait, or it is to end.
@@ -247,14 +245,11 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientWriter {
             let (deadline, release) = if has_frames {
                 match transport.poll_write(cx, client.outbox.writing()) {
                     Poll::Ready(Ok(bytes)) => {
-                        // After many bytes, other connections have a turn. The reader may continue.
-                        let may_read = client.note_written(bytes, now);
+                        client.note_written(bytes, now);
                         written += bytes;
+                        // After many bytes, other connections have a turn, and the reader may continue.
                         if written >= WRITE_BYTES / 2 {
                             return end_turn(cx);
-                        }
-                        if may_read {
-                            cx.waker().wake_by_ref();
                         }
                         continue;
                     }
