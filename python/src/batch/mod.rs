@@ -26,7 +26,7 @@ use crate::arrays::{ArrayArgument, Rows, read_only};
 use crate::fields::{self, Bound, Flag, Held, Object, Whole, refused};
 use crate::patience::{Turns, hold};
 use given::{chosen, of_arm, read, read_flags, read_methods, read_steps};
-use lanes::{Piece, Steps};
+use lanes::Piece;
 use pool::pool;
 use windows::Windows;
 
@@ -125,16 +125,7 @@ impl Batch {
         steps: Option<&Object<'_>>,
         effort: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        let counts = steps
-            .map(|steps| read_steps(steps, self.arms))
-            .transpose()?;
-        let steps = match &counts {
-            None => Steps::Alike(1),
-            Some(counts) => match counts.as_slice() {
-                [alike] => Steps::Alike(*alike),
-                each => Steps::Each(each),
-            },
-        };
+        let steps = steps.map_or_else(|| Ok(vec![1]), |steps| read_steps(steps, self.arms))?;
         let effort = read("effort", effort)?;
         let effort = self.rows(effort.as_ref(), Bound::Finite)?;
         let pool = pool(self.threads);
@@ -142,7 +133,7 @@ impl Batch {
         let threads = u64::try_from(self.threads).unwrap_or(1);
         let length = (threads.saturating_mul(STEPS_PER_LOOK) / arms).max(1);
         let first = Piece {
-            steps,
+            steps: &steps,
             effort: effort.as_ref(),
             done: 0,
             length,
@@ -153,7 +144,7 @@ impl Batch {
             stepping::take(py, lanes, &self.windows, pool.as_deref(), first)
         });
         if taken.is_err() && effort.is_some() {
-            for_either!(Either, &self.own, lanes => lanes::end_effort(&mut hold(py, lanes), steps));
+            for_either!(Either, &self.own, lanes => lanes::end_effort(&mut hold(py, lanes), &steps));
         }
         taken
     }
