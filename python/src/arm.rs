@@ -126,15 +126,16 @@ fn read<const N: usize>(
 /// An arm as an argument.
 pub(crate) type Given<'py> = Argument<Held<'py, Arm>>;
 
-impl<'py> LosslessArgument<'_, 'py> for Held<'py, Arm> {}
+impl LosslessArgument for Held<'_, Arm> {
+    fn rule() -> String {
+        "must be an Arm".to_owned()
+    }
+}
 
 impl Given<'_> {
     /// Its rods.
     pub(crate) fn chain(self) -> PyResult<Chain> {
-        match self {
-            Self::Is(arm) => Ok(arm.get().chain),
-            Self::Other(value) => Err(refused(format_args!("arm must be an Arm, got {value}"))),
-        }
+        Ok(self.read("arm")?.get().chain)
     }
 }
 
