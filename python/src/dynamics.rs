@@ -7,7 +7,7 @@ use pendularm::math::{self, dynamics, kinematics};
 use pyo3::IntoPyObject;
 use pyo3::prelude::{PyResult, Python, pyfunction};
 
-use crate::arm::{Chain, Given, for_either};
+use crate::arm::{Given, for_either};
 use crate::arrays::{ArrayArgument, Rows, joints_or, room};
 use crate::fields::{self, Bound, Held, Object, Real, refused};
 
@@ -112,7 +112,7 @@ macro_rules! of_rows {
             arm: Given<'py>,
             $($field: Object<'py>),+
         ) -> PyResult<Object<'py>> {
-            for_either!(Chain, &arm.chain()?, $arm => {
+            for_either!(&arm.chain()?, $arm => {
                 let fields = [$((stringify!($field), &$field)),+];
                 each_row(py, fields, Shape::$answer, |[$($field),+], $out| $body)
             })
@@ -151,7 +151,7 @@ pub(crate) fn forward_dynamics<'py>(
     qd: Object<'py>,
     effort: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.chain()?, arm => {
+    for_either!(&arm.chain()?, arm => {
         let fields = [("q", &q), ("qd", &qd), ("effort", &effort)];
         all_rows(py, arm.lengths().len(), fields, Shape::Joints, |rows, count, out| {
             forward_dynamics_of_rows(arm, rows, count, out);
@@ -206,7 +206,7 @@ pub(crate) fn inverse_kinematics<'py>(
         fields::number("y", y, Bound::Finite)?,
     );
     let phi = phi.map(|phi| phi.read("phi")).transpose()?;
-    for_either!(Chain, &arm.chain()?, arm => {
+    for_either!(&arm.chain()?, arm => {
         if let (3, Some(phi)) = (arm.lengths().len(), phi) {
             fields::number("phi", Real::Is(phi), Bound::Finite)?;
         }

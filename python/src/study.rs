@@ -19,7 +19,7 @@ use pendularm::study::stability::{Limits, search_limits};
 use pyo3::prelude::{PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
-use crate::arm::{Chain, Given, for_either, or_default};
+use crate::arm::{Given, for_either, or_default};
 use crate::arrays::{joints_or, room};
 use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
 use crate::gains;
@@ -52,7 +52,7 @@ pub(crate) fn stability<'py>(
 ) -> PyResult<Held<'py, PyDict>> {
     let method = integrator.method("integrator")?;
     let period = read_period(control_period)?;
-    for_either!(Chain, or_default(arm)?, arm => {
+    for_either!(or_default(arm)?, arm => {
         let gains = gains::read(gains.as_ref(), Gains::default())?;
         let setpoint = Setpoint::at(joints_or("setpoint", setpoint.as_ref(), Bound::Finite, [0.0; _])?);
         let control = ControlLoop::new(arm, gains, setpoint).with_method(method).with_period(period);
@@ -156,7 +156,7 @@ pub(crate) fn rollout<'py>(
     let reference = reference.read("reference")?;
     let period = read_period(control_period)?;
     let method = integrator.method("integrator")?;
-    for_either!(Chain, or_default(arm)?, arm => {
+    for_either!(or_default(arm)?, arm => {
         run(py, RolloutRequest {
             control: read_loop(arm, gains.as_ref(), setpoint.as_ref())?
                 .with_method(method)
@@ -255,7 +255,7 @@ pub(crate) fn suggest_gains<'py>(
     }
     let method = integrator.method("integrator")?;
     let timestep = fields::number("timestep", timestep, Bound::Positive)?;
-    for_either!(Chain, or_default(arm)?, arm => {
+    for_either!(or_default(arm)?, arm => {
         let control = ControlLoop::free(arm).with_method(method).with_timestep(timestep);
         let mut search = Paused::new(search_gains(control, requirements));
         let found = until_done(py, || search.advance())?.map_err(refused)?;
@@ -299,7 +299,7 @@ pub(crate) fn plan<'py>(
 ) -> PyResult<Held<'py, PyDict>> {
     let error = fields::number("error", error, Bound::Positive)?;
     let period = read_period(control_period)?;
-    for_either!(Chain, or_default(arm)?, arm => {
+    for_either!(or_default(arm)?, arm => {
         let control = read_loop(arm, gains.as_ref(), setpoint.as_ref())?.with_period(period);
         let usual = if control.is_free() { 10.0 } else { 4.0 };
         let mut planning = Paused::new(planner::plan(Task {
