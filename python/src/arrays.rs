@@ -9,7 +9,7 @@ use numpy::{
 };
 use pyo3::exceptions::{PyMemoryError, PyOverflowError};
 use pyo3::intern;
-use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python};
+use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
 use crate::fields::{
@@ -74,7 +74,7 @@ impl<'py> ArrayArgument<'py> {
         }
         let array = match value.cast::<PyArrayDyn<f64>>() {
             Ok(array) => array.clone(),
-            Err(_) => converted(value).map_err(|why| {
+            Err(_) => as_doubles(value).map_err(|why| {
                 if why.is_instance_of::<PyOverflowError>(value.py()) {
                     return beyond(field);
                 }
@@ -179,7 +179,8 @@ fn is_writeable(array: &Object<'_>) -> PyResult<bool> {
 }
 
 /// Converts everything that NumPy can convert to doubles, except complex numbers, text and `None`.
-fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
+#[pyfunction]
+pub(crate) fn as_doubles<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     let py = value.py();
     let numpy = py.import("numpy")?;
     let array = numpy.call_method1("asarray", (value,))?;

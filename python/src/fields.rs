@@ -11,7 +11,7 @@ use pendularm::math::integrator::{Method, UnknownMethod};
 use pyo3::Borrowed;
 use pyo3::exceptions::{PyOverflowError, PyValueError};
 use pyo3::intern;
-use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyErr, PyResult};
+use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyErr, PyResult, pyfunction};
 use pyo3::types::{PyBool, PyFloat, PyInt, PyList, PyStringMethods, PyTuple};
 
 /// Most dimensions of an array, and so the largest depth of nested lists.
@@ -79,6 +79,7 @@ pub(crate) fn beyond(field: &str) -> PyErr {
 }
 
 /// Whether some of these numbers are masked. NumPy also reads masked numbers inside a list.
+#[pyfunction]
 pub(crate) fn is_masked(value: &Object<'_>) -> PyResult<bool> {
     is_masked_within(value, MOST_DIMENSIONS)
 }
@@ -114,6 +115,7 @@ fn is_masked_within(value: &Object<'_>, depth: usize) -> PyResult<bool> {
 }
 
 /// Whether this, or a part of it, has more than [`MOST_LISTED`] entries and would be copied entry by entry.
+#[pyfunction]
 pub(crate) fn is_too_long(value: &Object<'_>) -> PyResult<bool> {
     is_too_long_within(value, MOST_DIMENSIONS)
 }

@@ -11,6 +11,7 @@ __all__ = [
     "Batch",
     "Divergence",
     "Simulation",
+    "as_doubles",
     "coriolis",
     "default_gains",
     "end_effector",
@@ -18,6 +19,8 @@ __all__ = [
     "gravity_load",
     "inverse_dynamics",
     "inverse_kinematics",
+    "is_masked",
+    "is_too_long",
     "kinetic_energy",
     "mass_matrix",
     "plan",
@@ -168,6 +171,9 @@ class Batch:
     def end_effector(self) -> _Floats: ...
     def __len__(self) -> int: ...
 
+def as_doubles(value: Any) -> _Floats: ...
+def is_masked(value: Any) -> bool: ...
+def is_too_long(value: Any) -> bool: ...
 def default_gains(links: int = 2) -> dict[str, _Floats]: ...
 def mass_matrix(arm: Arm, q: ArrayLike) -> _Floats: ...
 def coriolis(arm: Arm, q: ArrayLike, qd: ArrayLike) -> _Floats: ...
