@@ -186,46 +186,7 @@ def end_effector(arm: Arm, q: ArrayLike) -> _Floats: ...
 def inverse_kinematics(
     arm: Arm, x: float, y: float, phi: float | None = None, *, present: ArrayLike | None = None
 ) -> _Floats: ...
-def stability(
-    arm: Arm | None = None,
-    *,
-    integrator: str = "rk4",
-    gains: Mapping[str, ArrayLike] | None = None,
-    setpoint: ArrayLike | None = None,
-    q: ArrayLike | None = None,
-    qd: ArrayLike | None = None,
-    control_period: float = 0.0,
-) -> dict[str, Any]: ...
-def rollout(
-    arm: Arm | None = None,
-    *,
-    q0: ArrayLike | None = None,
-    qdot0: ArrayLike | None = None,
-    duration: float = 10.0,
-    timestep: float = 0.001,
-    integrator: str = "rk4",
-    gains: Mapping[str, ArrayLike] | None = None,
-    setpoint: ArrayLike | None = None,
-    samples: int = 1001,
-    reference: bool | np.bool_ = False,
-    control_period: float = 0.0,
-) -> dict[str, Any]: ...
-def suggest_gains(
-    arm: Arm | None = None,
-    *,
-    settling_time: float = 4.0,
-    margin: float = 1.25,
-    timestep: float = 0.001,
-    integrator: str = "rk4",
-) -> dict[str, Any]: ...
-def plan(
-    error: float,
-    arm: Arm | None = None,
-    *,
-    duration: float | None = None,
-    q0: ArrayLike | None = None,
-    qdot0: ArrayLike | None = None,
-    gains: Mapping[str, ArrayLike] | None = None,
-    setpoint: ArrayLike | None = None,
-    control_period: float = 0.0,
-) -> dict[str, Any]: ...
+def stability(arguments: dict[str, Any], /) -> dict[str, Any]: ...
+def rollout(arguments: dict[str, Any], /) -> dict[str, Any]: ...
+def suggest_gains(arguments: dict[str, Any], /) -> dict[str, Any]: ...
+def plan(arguments: dict[str, Any], /) -> dict[str, Any]: ...
