@@ -1,6 +1,7 @@
 """Actions of the bridge, for peers.py. The SDK has no action client, so each action is used through its services and
 topics."""
 
+import numpy
 from peers_stage import JAZZY, LATCHED, tokens
 from programs import wait_for
 from zenoh_ros2_sdk import ROS2Subscriber
@@ -17,8 +18,6 @@ def definition(fields, **inside):
 
 def test_a_goal_is_sent_as_an_action(peer, session):
     """The services and subscriptions of one action, with the hashes in the graph."""
-    import numpy
-
     place = "/ik_action/_action/"
     hashes = {token[9]: (token[10], token[11]) for kind in ["SS", "MP"] for token in tokens(session, kind)}
 
@@ -111,8 +110,6 @@ def test_a_goal_is_sent_as_an_action(peer, session):
 
 def test_a_path_is_sent_as_an_action(peer, session, states):
     """Uses ROS 2's definition. Fields for other robots are empty."""
-    import numpy
-
     name = "control_msgs/action/FollowJointTrajectory"
     place = "/joint_trajectory_controller/follow_joint_trajectory/_action/"
     hashes = {token[9]: token[11] for token in tokens(session, "SS")}
