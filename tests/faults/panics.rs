@@ -9,8 +9,6 @@ use std::time::Duration;
 
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Node, WIDE, Watched, settle};
-use actix::fut::wrap_future;
-use actix::prelude::*;
 use bytes::Bytes;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::Nodes;
@@ -19,7 +17,6 @@ use pendularm::actors::panics::{self, contain};
 use pendularm::protocol::catalog::{Service, Topic};
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::sync::oneshot;
 use tokio::time::timeout;
 
 static ENDS: OnceLock<Mutex<Vec<String>>> = OnceLock::new();
