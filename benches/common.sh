@@ -1,6 +1,6 @@
-# Sourced by run.sh, load/run.sh, attack/run.sh, peers/run.sh and scripts/soak.sh: the folder of results, and the
-# environment of a measurement. Needs: `root` (this project). Sets: `benches`, `target`, `built`, `core`. A kept run
-# names the processor, never the machine or a path.
+# Sourced by run.sh, load/run.sh, attack/run.sh, peers/run.sh, equal_error/run.sh and scripts/soak.sh: the folder of
+# results, the environment of a measurement, and the programs to compare with. Needs: `root` (this project). Sets:
+# `benches`, `target`, `built`, `core`. A kept run names the processor, never the machine or a path.
 
 benches=$root/benches
 target=${CARGO_TARGET_DIR:-$root/target}
@@ -58,6 +58,36 @@ environment() {
     echo "system:    $(uname -s) $(uname -r | cut -d- -f1)"
     echo "rustc:     $(cd "$root" && rustc --version), $(cd "$root" && rustc -vV | sed -n 's/^host: //p'), no flags beyond the release profile"
     echo "load:      $(cut -d' ' -f1-3 /proc/loadavg 2>/dev/null || uptime) (1, 5, 15 minutes, at the start)"
+}
+
+# Headers and libraries of arms in C and C++, from wheels in benches/peers/.venv, as the requirements.txt of each given
+# folder names them. Sets `venv`, `packages`, `prefix` (where Pinocchio is), `mujoco` (its library), and the compilers'
+# commands `cc`, `cxx`, `c` and `pinocchio`.
+install_wheels() {
+    local tool folder
+    venv=$benches/peers/.venv
+    cc=${CC:-gcc}
+    cxx=${CXX:-g++}
+    for tool in python3 "$cc" "$cxx" cargo; do
+        command -v "$tool" >/dev/null || fail "$tool is needed"
+    done
+    say "installing the peers into benches/peers/.venv"
+    [ -x "$venv/bin/python" ] || python3 -m venv "$venv"
+    for folder in "$@"; do
+        cmp -s "$folder/requirements.txt" "$venv/${folder##*/}.txt" && continue
+        "$venv/bin/python" -m pip install --quiet --no-compile --disable-pip-version-check --only-binary :all: --no-deps \
+            -r "$folder/requirements.txt"
+        cp "$folder/requirements.txt" "$venv/${folder##*/}.txt"
+    done
+    packages=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
+    prefix=$packages/cmeel.prefix
+    mujoco=$(echo "$packages"/mujoco/libmujoco.so.*)
+    [ -e "$mujoco" ] || fail "the wheel of MuJoCo has no library for this system"
+    c=("$cc" -std=c11 -Wall -Wextra -D_POSIX_C_SOURCE=200809L -isystem "$packages/mujoco/include")
+    # The definitions are those of Pinocchio's own CMake files.
+    pinocchio=("$cxx" -std=c++17 -O3 -DNDEBUG -w -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBOOST_MPL_LIMIT_VECTOR_SIZE=30
+        -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS -DBOOST_FUSION_INVOKE_MAX_ARITY=12
+        -isystem "$prefix/include" -isystem "$prefix/include/eigen3")
 }
 
 # Redis and mosquitto, from Debian's packages as root. Needs: `scratch` (a folder).

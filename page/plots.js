@@ -61,9 +61,10 @@ function view(id) {
   return { now: newest() || 0, span: shownSpan(), links: state.links, shown, cursor, level: id === "energy" ? reference() : NaN };
 }
 
-/** Shows less time for 1, more for -1. */
+/** Shows less time for 1, more for -1. In the course the plots are hidden and stay as they are. */
 export function zoomPlots(way) {
   const choice = byId("plot-span");
+  if (!choice.checkVisibility()) return;
   choice.selectedIndex = Math.min(choice.length - 1, Math.max(0, choice.selectedIndex - way));
   choice.dispatchEvent(new Event("change"));
 }

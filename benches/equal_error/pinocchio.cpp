@@ -11,7 +11,7 @@ void run(void *context, long steps, double *end)
 {
     RodArm &arm = *static_cast<RodArm *>(context);
     arm.q.setConstant(START_POSITION);
-    arm.v.setConstant(START_RATE);
+    arm.v.setConstant(START_VELOCITY);
     for (long step = 0; step < steps; step++)
         arm.rk4(DURATION / static_cast<double>(steps));
     memcpy(end, arm.q.data(), static_cast<size_t>(arm.links) * sizeof(double));

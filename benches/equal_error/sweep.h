@@ -5,25 +5,12 @@
 #define SWEEP_H
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <time.h>
 
-enum { LINKS_MAX = 3 };
+#include "../peers/harness.h"
 
-static const double DURATION = 4.0;                        /* s */
-static const double GRAVITY = 9.81;                        /* m/s^2, along -y; lengths 1 m, masses 1 kg */
-static const double START_POSITION = 0.3, START_RATE = 0.2; /* of every joint; rad, rad/s */
-static const double REPEATED = 0.02;                       /* s; for how long a run is repeated, three times at least */
-static const double LONGEST = 1.0;                         /* s; a run that takes longer ends a sweep */
-
-static double now(void)
-{
-    struct timespec time;
-    clock_gettime(CLOCK_MONOTONIC, &time);
-    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-}
+static const double DURATION = 4.0;  /* s */
+static const double REPEATED = 0.02; /* s; for how long a run is repeated, three times at least */
+static const double LONGEST = 1.0;   /* s; a run that takes longer ends a sweep */
 
 /* Runs `run(context, steps, end)` with ever more steps, each time root two times as many. `truth` has the angles at the end. */
 static void sweep(const char *system, int links, char **truth, void (*run)(void *, long, double *), void *context)

@@ -40,7 +40,7 @@ await() {
     fail "$2 does not listen"
 }
 
-{ read -r redis_port; read -r mosquitto_port; } < <("$built/load" ports 2)
+{ read -r redis_port; read -r mosquitto_port; } < <("$built/load" ports)
 
 # Every setting that would drop a message or write one to a disk is off.
 redis-server --bind 127.0.0.1 --port "$redis_port" --dir "$scratch" --save '' --appendonly no --maxclients 2000 \

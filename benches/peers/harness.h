@@ -29,13 +29,13 @@ typedef struct {
     double q[LINKS_MAX], v[LINKS_MAX], tau[LINKS_MAX];
 } State;
 
-static void fail(const char *why)
+static inline void fail(const char *why)
 {
     fprintf(stderr, "peers: %s\n", why);
     exit(1);
 }
 
-static void read_numbers(FILE *file, int links, double *numbers)
+static inline void read_numbers(FILE *file, int links, double *numbers)
 {
     for (int i = 0; i < links; i++)
         if (fscanf(file, "%lf", &numbers[i]) != 1)
@@ -43,7 +43,7 @@ static void read_numbers(FILE *file, int links, double *numbers)
 }
 
 /* The states of one arm, a line each: positions [rad], velocities [rad/s], efforts [N m]. */
-static void read_states(const char *path, int links, State *states)
+static inline void read_states(const char *path, int links, State *states)
 {
     FILE *file = fopen(path, "r");
     if (!file)
@@ -57,7 +57,7 @@ static void read_states(const char *path, int links, State *states)
 }
 
 /* One result to be compared: its name, then numbers with every digit. */
-static void print_result(const char *name, int k, int links, const double *first, const double *second)
+static inline void print_result(const char *name, int k, int links, const double *first, const double *second)
 {
     printf("%s %d", name, k);
     for (int i = 0; i < links; i++)
@@ -67,21 +67,21 @@ static void print_result(const char *name, int k, int links, const double *first
     printf("\n");
 }
 
-static double now(void)
+static inline double now(void)
 {
     struct timespec time;
     clock_gettime(CLOCK_MONOTONIC, &time);
     return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
-static int by_size(const void *a, const void *b)
+static inline int by_size(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
 }
 
 /* Times `run`, which makes CALLS calls, and prints `system,links,"what",shortest,median` in ns per call. */
-static void measure(const char *system, int links, const char *what, void (*run)(void *), void *context)
+static inline void measure(const char *system, int links, const char *what, void (*run)(void *), void *context)
 {
     static double times[RUNS_MAX];
     const double begun = now();

@@ -13,24 +13,7 @@ source "$root/benches/common.sh"
 here=$benches/peers
 passes=${PASSES:-5}
 [ -z "$quick" ] || passes=1
-cc=${CC:-gcc}
-cxx=${CXX:-g++}
-
-for tool in python3 "$cc" "$cxx" cargo; do
-    command -v "$tool" >/dev/null || fail "$tool is needed"
-done
-
-say "installing the peers into benches/peers/.venv"
-[ -x "$here/.venv/bin/python" ] || python3 -m venv "$here/.venv"
-if ! cmp -s "$here/requirements.txt" "$here/.venv/installed.txt"; then
-    "$here/.venv/bin/python" -m pip install --quiet --no-compile --disable-pip-version-check --only-binary :all: --no-deps \
-        -r "$here/requirements.txt"
-    cp "$here/requirements.txt" "$here/.venv/installed.txt"
-fi
-packages=$("$here/.venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
-prefix=$packages/cmeel.prefix
-mujoco=$(echo "$packages"/mujoco/libmujoco.so.*)
-[ -e "$mujoco" ] || fail "the wheel of MuJoCo has no library for this system"
+install_wheels "$here"
 
 # Compiles $1 from the source $2 with the rest, unless it is newer than all that is written here.
 program() {
@@ -42,16 +25,11 @@ program() {
     fi
 }
 mkdir -p "$target/peers"
-# The definitions are those of Pinocchio's own CMake files. With the library there is no -march, because it
-# changes the alignment of Eigen's types, which must be the library's.
-pinocchio=("$cxx" -std=c++17 -O3 -DNDEBUG -w -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBOOST_MPL_LIMIT_VECTOR_SIZE=30
-    -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS -DBOOST_FUSION_INVOKE_MAX_ARITY=12
-    -isystem "$prefix/include" -isystem "$prefix/include/eigen3")
+# With the library there is no -march, because it changes the alignment of Eigen's types, which must be the library's.
 libraries=(-L"$prefix/lib" -lpinocchio_default -Wl,-rpath,"$prefix/lib")
 program pinocchio-wheel pinocchio.cpp "${pinocchio[@]}" -DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION
 libraries=("$mujoco" -Wl,-rpath,"$(dirname "$mujoco")")
-program mujoco mujoco.c "$cc" -std=c11 -O3 -march=native -Wall -Wextra -D_POSIX_C_SOURCE=200809L \
-    -isystem "$packages/mujoco/include"
+program mujoco mujoco.c "${c[@]}" -O3 -march=native
 systems=(pendularm "pinocchio wheel" mujoco "mujoco bare")
 if [ -z "$quick" ]; then
     systems+=("pinocchio native" "generated plain" "generated native" "generated fast")
@@ -66,7 +44,7 @@ if [ -z "$quick" ]; then
         generated() { # name, flags
             local name=$1
             shift
-            "$cc" -std=c11 -Wall -Wextra -D_POSIX_C_SOURCE=200809L "-DJOINTS=$links" "-DGENERATED=\"$forward\"" "$@" \
+            "${c[@]}" "-DJOINTS=$links" "-DGENERATED=\"$forward\"" "$@" \
                 "$here/generated.c" -o "$target/peers/generated-$name-$links" -lm
         }
         generated plain -O3

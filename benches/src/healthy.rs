@@ -87,21 +87,16 @@ impl Healthy {
             faults: vec!["a healthy client broke".to_owned()],
             ..Health::default()
         };
-        let [mut health, watched, visited] = self
+        let [mut called, watched, visited] = self
             .threads
             .map(|thread| thread.join().unwrap_or_else(lost));
-        health.delays.sort_unstable_by(f64::total_cmp);
-        health.faults.extend(watched.faults);
-        health.faults.extend(visited.faults);
+        called.delays.sort_unstable_by(f64::total_cmp);
         Health {
+            asked: called.asked,
+            delays: called.delays,
             longest_gap: watched.longest_gap,
-            ..Health {
-                visits: visited.visits,
-                served: visited.served,
-                longest_visit: visited.longest_visit,
-                visit_fault: visited.visit_fault,
-                ..health
-            }
+            faults: [called.faults, watched.faults, visited.faults].concat(),
+            ..visited
         }
     }
 }
@@ -109,19 +104,19 @@ impl Healthy {
 impl Target {
     /// A client that has sent the token if the server requires one.
     fn connect(self) -> Result<Client, String> {
-        let open = || {
-            let mut client = Client::connect(Framing::Lines, self.address, self.patience)?;
-            if self.locked {
-                send(&mut client, &json!({"op": "auth", "token": TOKEN}))?;
-            }
-            Ok(client)
-        };
-        open().map_err(|error: Error| format!("connecting: {error}"))
+        let connected = Client::connect(Framing::Lines, self.address, self.patience);
+        let mut client = connected.map_err(|error| format!("connecting: {error}"))?;
+        if self.locked {
+            let sent = send(&mut client, &json!({"op": "auth", "token": TOKEN}));
+            sent.map_err(|why| format!("connecting: {why}"))?;
+        }
+        Ok(client)
     }
 }
 
-fn send(client: &mut Client, frame: &Value) -> Result<(), Error> {
-    client.write(format!("{frame}\n").as_bytes())
+fn send(client: &mut Client, frame: &Value) -> Result<(), String> {
+    let sent = client.write(format!("{frame}\n").as_bytes());
+    sent.map_err(|error| error.to_string())
 }
 
 fn milliseconds(time: Duration) -> f64 {
@@ -157,7 +152,7 @@ fn call(mut client: Client, target: Target, stop: &AtomicBool) -> Health {
             }
             Ok(frame) => health.faults.push(format!("the caller: {frame}")),
             Err(Error::Late) => {}
-            Err(error) => fault = Some(error),
+            Err(error) => fault = Some(error.to_string()),
         }
     }
     health
@@ -178,7 +173,7 @@ fn watch(mut client: Client, stop: &AtomicBool) -> Health {
                 last = Instant::now();
             }
             Ok(_) | Err(Error::Late) => {}
-            Err(error) => fault = Some(error),
+            Err(error) => fault = Some(error.to_string()),
         }
     }
     health.longest_gap = health.longest_gap.max(milliseconds(last.elapsed()));
@@ -214,37 +209,27 @@ fn visit(target: Target, number: usize) -> Result<(), String> {
     let service = format!("/newcomer/{number}/service");
     let topic = format!("/newcomer/{number}/topic");
     let part = |name: &'static str| move |why: String| format!("{name}: {why}");
-    let ask =
-        |client: &mut Client, frame: Value| send(client, &frame).map_err(|error| error.to_string());
 
     let mut calling = || {
-        ask(
-            client,
-            json!({"op": "advertise_service", "service": service}),
-        )?;
-        ask(
-            client,
-            json!({"op": "call_service", "service": service, "id": "call"}),
-        )?;
+        let advertise = json!({"op": "advertise_service", "service": service});
+        send(client, &advertise)?;
+        let call = json!({"op": "call_service", "service": service, "id": "call"});
+        send(client, &call)?;
         let forwarded = next(client, "call_service", target.patience)?;
-        ask(
-            client,
-            json!({"op": "service_response", "service": service, "id": forwarded["id"], "result": true, "values": {}}),
-        )?;
+        let response = json!({"op": "service_response", "service": service, "id": forwarded["id"], "result": true, "values": {}});
+        send(client, &response)?;
         succeeded(&next(client, "service_response", target.patience)?)
     };
     calling().map_err(part("a forwarded call"))?;
 
     let mut publishing = || {
         let content = "x".repeat(MESSAGE);
-        ask(client, json!({"op": "subscribe", "topic": topic}))?;
-        ask(client, json!({"op": "advertise", "topic": topic}))?;
-        ask(
-            client,
-            json!({"op": "publish", "topic": topic, "msg": {"data": content}}),
-        )?;
+        send(client, &json!({"op": "subscribe", "topic": topic}))?;
+        send(client, &json!({"op": "advertise", "topic": topic}))?;
+        let message = json!({"op": "publish", "topic": topic, "msg": {"data": content}});
+        send(client, &message)?;
         let came = next(client, "publish", target.patience)?;
-        let whole = came["msg"]["data"].as_str() == Some(content.as_str());
+        let whole = came["msg"]["data"] == content;
         whole
             .then_some(())
             .ok_or_else(|| "its message came back different".to_owned())
@@ -254,10 +239,8 @@ fn visit(target: Target, number: usize) -> Result<(), String> {
     let mut computing = || {
         let args = json!({"function": "t", "x0": 0, "dt": 0.01, "steps": 100, "integrator": "rk4"});
         let service = "/arm_sim/integration_step";
-        ask(
-            client,
-            json!({"op": "call_service", "service": service, "id": "compute", "args": args}),
-        )?;
+        let call = pendularm_client::call(service, &args, &json!("compute"));
+        send(client, &call)?;
         succeeded(&next(client, "service_response", target.patience)?)
     };
     computing().map_err(part("a computation"))?;

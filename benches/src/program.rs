@@ -1,4 +1,4 @@
-//! The program's process: memory, descriptors, threads, processor time, and its lines on standard error.
+//! The program's process: memory, descriptors, threads, processor and simulation time, and its lines on standard error.
 //!
 //! **Invariant:** it is stopped by its own process id at every end of the run.
 
@@ -9,6 +9,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use pendularm_client::blocking::Client;
 use pendularm_client::ending;
 
 /// Lines of the log that are kept, beside those of panics.
@@ -19,16 +20,8 @@ pub struct Program {
     child: Child,
     /// Address that it listens on.
     pub address: SocketAddr,
-    log: Arc<Mutex<Log>>,
-}
-
-/// Its lines on standard error.
-#[derive(Debug, Default, Clone)]
-pub struct Log {
-    /// The first lines, and those of panics.
-    pub lines: Vec<String>,
-    /// Lines about a panic.
-    pub panics: u64,
+    /// The first lines on standard error, and those of panics.
+    log: Arc<Mutex<Vec<String>>>,
 }
 
 /// The state of a process.
@@ -64,13 +57,14 @@ impl Program {
             .trim()
             .strip_prefix("listening on ")
             .and_then(|text| text.parse().ok());
-        let log: Arc<Mutex<Log>> = Arc::default();
+        let log: Arc<Mutex<Vec<String>>> = Arc::default();
         if let Some(stderr) = child.stderr.take() {
             let log = Arc::clone(&log);
             std::thread::spawn(move || {
                 for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                    if let Ok(mut log) = log.lock() {
-                        log.note(line);
+                    let mut log = log.lock().expect("nobody panics with it");
+                    if log.len() < MAX_LINES || line.contains("panic") {
+                        log.push(line);
                     }
                 }
             });
@@ -92,9 +86,9 @@ impl Program {
         self.child.id()
     }
 
-    /// Its lines so far.
-    pub fn log(&self) -> Log {
-        self.log.lock().map(|log| log.clone()).unwrap_or_default()
+    /// Its first lines on standard error so far, and those of panics.
+    pub fn log(&self) -> Vec<String> {
+        self.log.lock().expect("nobody panics with it").clone()
     }
 
     /// Ends it by a signal, and returns the time and the exit status.
@@ -119,15 +113,6 @@ impl Drop for Program {
     }
 }
 
-impl Log {
-    fn note(&mut self, line: String) {
-        self.panics += u64::from(line.contains("panic"));
-        if self.lines.len() < MAX_LINES || line.contains("panic") {
-            self.lines.push(line);
-        }
-    }
-}
-
 /// The state of the process with this id. None if it has ended.
 pub fn vitals(pid: u32) -> Option<Vitals> {
     let descriptors = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count();
@@ -149,6 +134,16 @@ fn status_field(pid: u32, name: &str) -> Option<f64> {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix(name))?;
     Some(line.split_whitespace().next()?.parse::<f64>().ok()? / 1024.0)
+}
+
+/// The next simulation time on `/clock`, to which the client has subscribed \[s\].
+///
+/// # Panics
+/// If none arrives.
+pub fn simulation_time(client: &mut Client) -> f64 {
+    let clock = &client.message("/clock")["clock"];
+    let number = |key: &str| clock[key].as_f64().expect("a number");
+    number("sec") + 1e-9 * number("nanosec")
 }
 
 /// Processor time of all threads of a process so far, as the scheduler counts it \[ns\].

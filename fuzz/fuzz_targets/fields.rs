@@ -38,8 +38,7 @@ fn examine(input: &[u8]) {
     };
     let mut fields = Fields::read(&args, service).expect("the other reading takes it");
     for field in service.fields() {
-        let how = How::new(field, seed);
-        compare(&mut fields, &mut model, field, how);
+        compare(&mut fields, &mut model, field, seed);
     }
     let is_accepted = fields.accepted();
     let rejections = fields.finish();
@@ -77,33 +76,6 @@ fn arguments(service: Service, args: &[u8]) -> Option<Arguments> {
             ..
         })) if name == service.name() => Some(args),
         _ => None,
-    }
-}
-
-/// The ways in which a field is read.
-#[derive(Clone, Copy)]
-enum How {
-    Number(Bound),
-    Numbers(usize, Bound),
-    Boolean,
-    Text,
-    Choice,
-    Count(u64),
-    Object,
-}
-
-impl How {
-    fn new(field: &Field, seed: u8) -> Self {
-        let bound = [Bound::Finite, Bound::Positive, Bound::NonNegative][usize::from(seed) % 3];
-        match field.kind {
-            "float64" => Self::Number(bound),
-            "float64[]" => Self::Numbers(usize::from(seed >> 2) % 4, bound),
-            "bool" => Self::Boolean,
-            "uint64" => Self::Count([1, 10_000, u64::MAX][usize::from(seed) % 3]),
-            "string" if seed & 4 == 0 => Self::Text,
-            "string" => Self::Choice,
-            _ => Self::Object,
-        }
     }
 }
 
@@ -209,12 +181,13 @@ fn within(number: f64, bound: Bound) -> bool {
         }
 }
 
-/// Reads one field in both ways.
-fn compare(fields: &mut Fields<'_>, model: &mut Model<'_>, field: &Field, how: How) {
+/// Reads one field in both ways. The seed selects its bounds.
+fn compare(fields: &mut Fields<'_>, model: &mut Model<'_>, field: &Field, seed: u8) {
     let name = field.name;
     let value = model.take(field);
-    match how {
-        How::Number(bound) => {
+    let bound = [Bound::Finite, Bound::Positive, Bound::NonNegative][usize::from(seed) % 3];
+    match field.kind {
+        "float64" => {
             let expected = value.and_then(|value| model.number(name, value, bound));
             let found = fields.number(name, bound);
             assert_eq!(
@@ -223,34 +196,36 @@ fn compare(fields: &mut Fields<'_>, model: &mut Model<'_>, field: &Field, how: H
                 "{name}"
             );
         }
-        How::Numbers(count, bound) => {
+        "float64[]" => {
+            let count = usize::from(seed >> 2) % 4;
             let expected = value.and_then(|value| model.numbers(name, value, count, bound));
             let found = fields.numbers(name, count, bound);
             let bits =
                 |numbers: Vec<f64>| numbers.into_iter().map(f64::to_bits).collect::<Vec<_>>();
             assert_eq!(found.map(bits), expected.map(bits), "{name}");
         }
-        How::Boolean => {
+        "bool" => {
             let expected = value.and_then(|value| match value {
                 Json::Boolean(value) => Some(*value),
                 _ => model.refuse(name),
             });
             assert_eq!(fields.boolean(name), expected, "{name}");
         }
-        How::Text => {
+        "string" if seed & 4 == 0 => {
             let expected = value.and_then(|value| value.text().or_else(|| model.refuse(name)));
             assert_eq!(fields.text(name).as_deref(), expected, "{name}");
         }
-        How::Choice => {
+        "string" => {
             let chosen = |value: &Json| METHODS.into_iter().find(|one| value.text() == Some(one));
             let expected = value.and_then(|value| chosen(value).or_else(|| model.refuse(name)));
             assert_eq!(fields.choice(name, &METHODS, |one| one), expected, "{name}");
         }
-        How::Count(limit) => {
+        "uint64" => {
+            let limit = [1, 10_000, u64::MAX][usize::from(seed) % 3];
             let expected = value.and_then(|value| model.count(name, value, limit));
             assert_eq!(fields.count(name, 1..=limit), expected, "{name}");
         }
-        How::Object => compare_object(fields, model, field, value),
+        _ => compare_object(fields, model, field, value),
     }
 }
 
@@ -272,7 +247,7 @@ fn compare_object(
     };
     let read = fields.object(field.name, |members| {
         for member in field.members() {
-            compare(members, &mut inner, member, How::new(member, 11));
+            compare(members, &mut inner, member, 11);
         }
     });
     assert_eq!(read.is_some(), is_object, "{}", field.name);

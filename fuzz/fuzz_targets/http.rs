@@ -135,7 +135,7 @@ fn admission(settings: u8) -> Admission {
 
 /// Sends all bytes, then the end. Returns all bytes up to the end.
 async fn converse(admission: Admission, bytes: &[u8], piece: usize) -> Vec<u8> {
-    let stage = Stage::new(admission, Memory::default()).await;
+    let stage = Stage::new(admission, Memory::default(), false).await;
     let (mut input, mut output) = split(stage.connect(256));
     let mut answer = Vec::new();
     let talk = async {

@@ -9,13 +9,16 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use pendularm_fuzz::client::Door;
+use pendularm_client::codec::Framing;
 use pendularm_fuzz::limits::{DOING, hold};
-use pendularm_fuzz::session::{Step, play, play_with_arm};
+use pendularm_fuzz::session::{Step, play};
 
 fuzz_target!(|script: (bool, bool, bool, Vec<Step<'_>>)| {
     let (is_scarce, is_socket, has_arm, steps) = script;
-    let door = if is_socket { Door::Socket } else { Door::Plain };
-    let play = if has_arm { play_with_arm } else { play };
-    hold(0, DOING, || play(door, is_scarce, &steps));
+    let framing = if is_socket {
+        Framing::WebSocket
+    } else {
+        Framing::Lines
+    };
+    hold(0, DOING, || play(framing, is_scarce, has_arm, &steps));
 });

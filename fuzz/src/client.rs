@@ -11,31 +11,11 @@ use tokio::task::JoinHandle;
 use pendularm_client::codec::{Codec, Event, Framing};
 use pendularm_client::websocket::{LAST, append, append_close, append_message, handshake, opcode};
 
-/// The protocols of clients.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Door {
-    /// One object per line.
-    Plain,
-    /// One object per message.
-    Socket,
-}
-
-/// A message from the runtime.
-#[derive(Debug, PartialEq, Eq)]
-pub enum Received {
-    /// A frame, without its newline.
-    Json(String),
-    /// A frame in CBOR.
-    Binary(Vec<u8>),
-}
-
 /// The client's end of a connection.
 pub struct Client {
-    door: Door,
     out: UnboundedSender<Outgoing>,
     line: Rc<Line>,
     tasks: [JoinHandle<()>; 2],
-    codec: Codec,
 }
 
 enum Outgoing {
@@ -43,9 +23,8 @@ enum Outgoing {
     End,
 }
 
-#[derive(Default)]
 struct Line {
-    bytes: RefCell<Vec<u8>>,
+    codec: RefCell<Codec>,
     ended: Cell<bool>,
     paused: Cell<bool>,
     resumed: Notify,
@@ -54,32 +33,32 @@ struct Line {
 impl Client {
     /// A client of this end of a pipe; `piece` bytes are written at a time.
     #[must_use]
-    pub fn new(door: Door, stream: DuplexStream, piece: usize) -> Self {
+    pub fn new(framing: Framing, stream: DuplexStream, piece: usize) -> Self {
         let (input, output) = split(stream);
-        let line = Rc::new(Line::default());
+        let line = Rc::new(Line {
+            codec: RefCell::new(Codec::new(framing)),
+            ended: Cell::new(false),
+            paused: Cell::new(false),
+            resumed: Notify::new(),
+        });
         let (out, queue) = unbounded_channel();
         let reading = actix::spawn(read(input, Rc::clone(&line)));
         let writing = actix::spawn(write(output, queue, piece.max(1)));
         let client = Self {
-            door,
             out,
             line,
             tasks: [reading, writing],
-            codec: Codec::new(match door {
-                Door::Plain => Framing::Lines,
-                Door::Socket => Framing::WebSocket,
-            }),
         };
-        if door == Door::Socket {
+        if framing == Framing::WebSocket {
             client.send_bytes(handshake("127.0.0.1:9095", "/", "").into_bytes());
         }
         client
     }
 
-    /// Its protocol.
+    /// How its frames are separated.
     #[must_use]
-    pub fn door(&self) -> Door {
-        self.door
+    pub fn framing(&self) -> Framing {
+        self.line.codec.borrow().framing()
     }
 
     /// Sends bytes unchanged.
@@ -97,13 +76,13 @@ impl Client {
     #[must_use]
     pub fn encode(&self, frame: &str, style: u8) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(frame.len() + 16);
-        match self.door {
-            Door::Plain => {
+        match self.framing() {
+            Framing::Lines => {
                 bytes.extend_from_slice(frame.as_bytes());
                 let end = ["\n", "\r\n", "", " \n\n\t"][usize::from(style) % 4];
                 bytes.extend_from_slice(end.as_bytes());
             }
-            Door::Socket => {
+            Framing::WebSocket => {
                 let kind = if style & 1 == 0 {
                     opcode::TEXT
                 } else {
@@ -119,7 +98,7 @@ impl Client {
 
     /// Ends sending: by the stream's end, or by a close frame.
     pub fn finish(&self) {
-        if self.door == Door::Socket {
+        if self.framing() == Framing::WebSocket {
             let mut bytes = Vec::new();
             append_close(&mut bytes, [1, 2, 3, 4], 1000, "");
             self.send_bytes(bytes);
@@ -148,44 +127,38 @@ impl Client {
     /// Whether the handshake is complete.
     #[must_use]
     pub fn is_greeted(&self) -> bool {
-        self.codec.is_open()
+        self.line.codec.borrow().is_open()
     }
 
     /// Whether no message is incomplete, for a stream that has ended.
     #[must_use]
     pub fn ended_in_order(&self) -> bool {
-        self.line.bytes.borrow().is_empty() && self.codec.is_between_messages()
+        self.line.codec.borrow().is_between_messages()
     }
 
     /// The remaining bytes, for a message.
     #[must_use]
     pub fn rest(&self) -> String {
-        let bytes = String::from_utf8_lossy(&self.line.bytes.borrow()).into_owned();
-        format!("{bytes:?}, {:?}", self.codec)
+        format!("{:?}", self.line.codec.borrow())
     }
 
     /// Discards everything received since.
-    pub fn take_anything(&mut self) {
-        self.line.bytes.borrow_mut().clear();
-        self.codec.discard();
+    pub fn take_anything(&self) {
+        self.line.codec.borrow_mut().discard();
     }
 
-    /// Takes everything received since.
-    pub fn take(&mut self) -> Vec<Received> {
-        self.codec
-            .push(&std::mem::take(&mut *self.line.bytes.borrow_mut()));
+    /// Takes everything received since. Pings are answered.
+    #[must_use]
+    pub fn take(&self) -> Vec<Event> {
+        let mut codec = self.line.codec.borrow_mut();
         let mut received = Vec::new();
-        while let Some(event) = self.codec.next_event().expect("what a server may send") {
-            match event {
-                Event::Text(text) => received.push(Received::Json(text)),
-                Event::Binary(bytes) => received.push(Received::Binary(bytes)),
-                Event::Ping(payload) => {
-                    let mut pong = Vec::new();
-                    append(&mut pong, LAST | opcode::PONG, [9; 4], &payload);
-                    self.send_bytes(pong);
-                }
-                Event::Pong(_) | Event::Close(..) => {}
+        while let Some(event) = codec.next_event().expect("what a server may send") {
+            if let Event::Ping(payload) = &event {
+                let mut pong = Vec::new();
+                append(&mut pong, LAST | opcode::PONG, [9; 4], payload);
+                self.send_bytes(pong);
             }
+            received.push(event);
         }
         received
     }
@@ -207,7 +180,7 @@ async fn read(mut input: ReadHalf<DuplexStream>, line: Rc<Line>) {
         }
         match input.read(&mut chunk).await {
             Ok(0) | Err(_) => break,
-            Ok(read) => line.bytes.borrow_mut().extend_from_slice(&chunk[..read]),
+            Ok(read) => line.codec.borrow_mut().push(&chunk[..read]),
         }
     }
     line.ended.set(true);

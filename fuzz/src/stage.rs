@@ -29,7 +29,7 @@ use serde_json::json;
 use tokio::io::{DuplexStream, duplex};
 
 /// Address for clients, which `Host` must contain.
-pub const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
+const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
 
 thread_local! {
     static SYSTEM: SystemRunner = system();
@@ -56,9 +56,10 @@ pub fn run_apart<T>(execution: impl Future<Output = T>) -> T {
 }
 
 /// The node's treatments of a call.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub enum Manner {
     /// Answers at once.
+    #[default]
     Prompt,
     /// Holds it until another action.
     Holding,
@@ -71,14 +72,8 @@ pub enum Manner {
 /// The state that script and node share.
 #[derive(Default)]
 struct NodeState {
-    manner: Cell<Option<Manner>>,
+    manner: Cell<Manner>,
     held: RefCell<VecDeque<Caller>>,
-}
-
-/// Little room for all clients together: a few of them can fill it in one execution.
-#[must_use]
-pub fn scarce() -> Memory {
-    Memory::of(1, 1 << 20)
 }
 
 /// The runtime's side.
@@ -90,34 +85,21 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// A gateway whose one node answers at once.
-    pub async fn new(admission: Admission, memory: Memory) -> Self {
-        Self::raised(admission, memory, |_, _, _| {}).await
-    }
-
-    /// A gateway with the runtime's own nodes. Computations, which need other threads, are left to the one node.
-    pub async fn with_arm(admission: Admission, memory: Memory) -> Self {
-        Self::raised(admission, memory, |registry, gauges, nodes| {
-            let workers = WorkerPool::without_threads();
-            start_in_this_thread(Links::Two, registry, gauges, &workers, 1, nodes);
-            nodes
-                .services
-                .retain(|service, _| !service.is_computation());
-        })
-        .await
-    }
-
-    async fn raised(
-        admission: Admission,
-        memory: Memory,
-        start: impl FnOnce(&Addr<Registry>, &Arc<Gauges>, &mut Nodes),
-    ) -> Self {
+    /// A gateway whose one node answers at once. With `has_arm` it has the runtime's own nodes. Computations, which need
+    /// other threads, are then left to the one node.
+    pub async fn new(admission: Admission, memory: Memory, has_arm: bool) -> Self {
         let gauges = Arc::new(Gauges::with(memory));
         let registry = Registry::new(Arc::clone(&gauges)).start();
         let node_state = Rc::new(NodeState::default());
         let node = Node(Rc::clone(&node_state)).start();
         let mut nodes = Nodes::default();
-        start(&registry, &gauges, &mut nodes);
+        if has_arm {
+            let workers = WorkerPool::without_threads();
+            start_in_this_thread(Links::Two, &registry, &gauges, &workers, 1, &mut nodes);
+            nodes
+                .services
+                .retain(|service, _| !service.is_computation());
+        }
         let rosapi = catalog::Rosapi::ALL.into_iter().map(Service::Rosapi);
         for service in Service::ALL.into_iter().chain(rosapi) {
             let node = node.clone();
@@ -161,7 +143,7 @@ impl Stage {
 
     /// Sets the node's treatment of calls.
     pub fn behave(&self, manner: Manner) {
-        self.node_state.manner.set(Some(manner));
+        self.node_state.manner.set(manner);
     }
 
     /// The node answers the oldest held call.
@@ -212,7 +194,7 @@ impl Handler<Called> for Node {
             arguments,
             mut caller,
         } = call;
-        match self.0.manner.get().unwrap_or(Manner::Prompt) {
+        match self.0.manner.get() {
             Manner::Prompt => {
                 let status = Fields::read(&arguments, service)
                     .map_or_else(|why| why.to_string(), |_| String::new());

@@ -10,19 +10,31 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::arrays::{joints_or, property};
 use crate::fields::{self, Argument, Bound, Held, LosslessArgument, Object, Real, Whole, refused};
 
-/// Rods of 2 or 3 links.
+/// A value for 2 links or for 3: an arm, a simulation or another type.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Chain {
-    Two(Rods<2>),
-    Three(Rods<3>),
+pub(crate) enum Either<Two, Three> {
+    Two(Two),
+    Three(Three),
 }
 
-/// Runs the same code for both numbers of links, with an arm, a simulation or another type.
+impl<Two, Three> Either<Two, Three> {
+    pub(crate) fn links(&self) -> usize {
+        match self {
+            Self::Two(_) => 2,
+            Self::Three(_) => 3,
+        }
+    }
+}
+
+/// Rods of 2 or 3 links.
+pub(crate) type Chain = Either<Rods<2>, Rods<3>>;
+
+/// Runs the same code for both numbers of links.
 macro_rules! for_either {
-    ($kind:ident, $value:expr, $one:ident => $body:expr) => {
+    ($value:expr, $one:ident => $body:expr) => {
         match $value {
-            $kind::Two($one) => $body,
-            $kind::Three($one) => $body,
+            $crate::arm::Either::Two($one) => $body,
+            $crate::arm::Either::Three($one) => $body,
         }
     };
 }
@@ -62,43 +74,43 @@ impl Arm {
 
     /// Number of links, 2 or 3.
     #[getter]
-    pub(crate) fn links(&self) -> usize {
-        for_either!(Chain, &self.chain, arm => arm.lengths().len())
+    fn links(&self) -> usize {
+        self.chain.links()
     }
 
     /// Link lengths [m], (links,).
     #[getter]
     fn lengths<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray1<f64>>> {
-        for_either!(Chain, &self.chain, arm => property(py, arm.lengths()))
+        for_either!(&self.chain, arm => property(py, arm.lengths()))
     }
 
     /// Link masses [kg], (links,).
     #[getter]
     fn masses<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray1<f64>>> {
-        for_either!(Chain, &self.chain, arm => property(py, arm.masses()))
+        for_either!(&self.chain, arm => property(py, arm.masses()))
     }
 
     /// Gravity along -y [m/s²].
     #[getter]
     fn gravity(&self) -> f64 {
-        for_either!(Chain, &self.chain, arm => arm.gravity())
+        for_either!(&self.chain, arm => arm.gravity())
     }
 
     /// Distance from the base to the end effector of the stretched arm [m].
     #[getter]
     fn reach(&self) -> f64 {
-        for_either!(Chain, &self.chain, arm => arm.reach())
+        for_either!(&self.chain, arm => arm.reach())
     }
 
     fn __repr__(&self) -> String {
-        for_either!(Chain, &self.chain, arm => format!(
+        for_either!(&self.chain, arm => format!(
             "Arm({}, lengths={:?}, masses={:?}, gravity={:?})",
             self.links(), arm.lengths(), arm.masses(), arm.gravity()
         ))
     }
 
     fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
-        let numbers = for_either!(Chain, &self.chain, arm => {
+        let numbers = for_either!(&self.chain, arm => {
             [arm.lengths().as_slice(), arm.masses(), &[arm.gravity()]].concat()
         });
         PyTuple::new(py, numbers)?.hash()
@@ -126,15 +138,16 @@ fn read<const N: usize>(
 /// An arm as an argument.
 pub(crate) type Given<'py> = Argument<Held<'py, Arm>>;
 
-impl<'py> LosslessArgument<'_, 'py> for Held<'py, Arm> {}
+impl LosslessArgument for Held<'_, Arm> {
+    fn rule() -> String {
+        "must be an Arm".to_owned()
+    }
+}
 
 impl Given<'_> {
     /// Its rods.
     pub(crate) fn chain(self) -> PyResult<Chain> {
-        match self {
-            Self::Is(arm) => Ok(arm.get().chain),
-            Self::Other(value) => Err(refused(format_args!("arm must be an Arm, got {value}"))),
-        }
+        Ok(self.read("arm")?.get().chain)
     }
 }
 

@@ -2,8 +2,6 @@
 //!
 //! **Invariant:** numbers are read in the order of their indices, for every memory layout.
 
-use std::borrow::Cow;
-
 use numpy::ndarray::Dimension;
 use numpy::{
     Element, IntoPyArray, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
@@ -11,7 +9,7 @@ use numpy::{
 };
 use pyo3::exceptions::{PyMemoryError, PyOverflowError};
 use pyo3::intern;
-use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python};
+use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
 use crate::fields::{
@@ -76,7 +74,7 @@ impl<'py> ArrayArgument<'py> {
         }
         let array = match value.cast::<PyArrayDyn<f64>>() {
             Ok(array) => array.clone(),
-            Err(_) => converted(value).map_err(|why| {
+            Err(_) => as_doubles(value).map_err(|why| {
                 if why.is_instance_of::<PyOverflowError>(value.py()) {
                     return beyond(field);
                 }
@@ -104,11 +102,6 @@ impl<'py> ArrayArgument<'py> {
         self.array.shape()
     }
 
-    /// The numbers, row by row.
-    pub(crate) fn values(&self) -> PyResult<&[f64]> {
-        Ok(self.array.as_slice()?)
-    }
-
     /// The numbers as one row of `width` per arm, or one row for all arms. Without `arms` only one row is valid.
     pub(crate) fn rows(
         &self,
@@ -125,17 +118,7 @@ impl<'py> ArrayArgument<'py> {
                 in_python(shape)
             )));
         }
-        let is_one = shape.len() == 1;
-        let values = self.values()?;
-        held(field, values, bound, |at| match is_one {
-            true => format!("[{at}]"),
-            false => format!("[{}][{}]", at / width, at % width),
-        })?;
-        Ok(Rows {
-            values: Cow::Borrowed(values),
-            width,
-            is_one,
-        })
+        self.checked(width, shape.len() == 1, bound)
     }
 
     /// The numbers as one per arm, or one for all arms.
@@ -148,18 +131,21 @@ impl<'py> ArrayArgument<'py> {
                 in_python(shape)
             )));
         }
-        let values = self.values()?;
-        held(field, values, bound, |arm| {
-            if shape.is_empty() {
-                String::new()
-            } else {
-                format!("[{arm}]")
-            }
+        self.checked(1, shape.is_empty(), bound)
+    }
+
+    /// The numbers as rows of this width, all within a bound.
+    fn checked(&self, width: usize, is_one: bool, bound: Bound) -> PyResult<Rows<'_>> {
+        let values = self.array.as_slice()?;
+        held(&self.field, values, bound, |at| match self.shape() {
+            [] => String::new(),
+            [_] => format!("[{at}]"),
+            _ => format!("[{}][{}]", at / width, at % width),
         })?;
         Ok(Rows {
-            values: Cow::Borrowed(values),
-            width: 1,
-            is_one: shape.is_empty(),
+            values,
+            width,
+            is_one,
         })
     }
 }
@@ -193,7 +179,8 @@ fn is_writeable(array: &Object<'_>) -> PyResult<bool> {
 }
 
 /// Converts everything that NumPy can convert to doubles, except complex numbers, text and `None`.
-fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
+#[pyfunction]
+pub(crate) fn as_doubles<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     let py = value.py();
     let numpy = py.import("numpy")?;
     let array = numpy.call_method1("asarray", (value,))?;
@@ -230,9 +217,7 @@ pub(crate) fn joints<const N: usize>(
             shown(value)
         )));
     }
-    let values = numbers.values()?;
-    held(field, values, bound, |joint| format!("[{joint}]"))?;
-    <[f64; N]>::try_from(values).map_err(refused)
+    Ok(numbers.checked(N, true, bound)?.row(0))
 }
 
 /// As [`joints`], or `missing` without an argument.
@@ -248,7 +233,7 @@ pub(crate) fn joints_or<const N: usize>(
 /// One row per arm, or one for all arms.
 #[derive(Debug)]
 pub(crate) struct Rows<'a> {
-    values: Cow<'a, [f64]>,
+    values: &'a [f64],
     width: usize,
     is_one: bool,
 }

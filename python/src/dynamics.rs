@@ -7,7 +7,7 @@ use pendularm::math::{self, dynamics, kinematics};
 use pyo3::IntoPyObject;
 use pyo3::prelude::{PyResult, Python, pyfunction};
 
-use crate::arm::{Chain, Given, for_either};
+use crate::arm::{Given, for_either};
 use crate::arrays::{ArrayArgument, Rows, joints_or, room};
 use crate::fields::{self, Bound, Held, Object, Real, refused};
 
@@ -99,52 +99,46 @@ fn all_rows<'py, const K: usize>(
     Ok(flat.into_pyarray(py).reshape(shape)?.into_any())
 }
 
-/// Mass matrix M(q) [kg m²] at joint positions `q` [rad], of shape (links,) or (n, links): (links, links) or (n,
-/// links, links).
-#[pyfunction]
-pub(crate) fn mass_matrix<'py>(
-    py: Python<'py>,
-    arm: Given<'py>,
-    q: Object<'py>,
-) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.chain()?, arm => {
-        let fields = [("q", &q)];
-        each_row(py, fields, Shape::Square, |[q], out| {
-            out.extend(dynamics::mass_matrix(arm, &q).as_flattened());
-        })
-    })
+/// Functions of an arm and of one row or many of each field, applied row by row.
+macro_rules! of_rows {
+    ($(
+        $(#[$doc:meta])*
+        $name:ident($arm:ident, $($field:ident),+) -> $answer:ident, $out:ident => $body:expr;
+    )+) => {$(
+        $(#[$doc])*
+        #[pyfunction]
+        pub(crate) fn $name<'py>(
+            py: Python<'py>,
+            arm: Given<'py>,
+            $($field: Object<'py>),+
+        ) -> PyResult<Object<'py>> {
+            for_either!(&arm.chain()?, $arm => {
+                let fields = [$((stringify!($field), &$field)),+];
+                each_row(py, fields, Shape::$answer, |[$($field),+], $out| $body)
+            })
+        }
+    )+};
 }
 
-/// Coriolis and centrifugal effort C(q, qd) qd [N m] at positions `q` [rad] and rates `qd` [rad/s], of shape (links,)
-/// or (n, links).
-#[pyfunction]
-pub(crate) fn coriolis<'py>(
-    py: Python<'py>,
-    arm: Given<'py>,
-    q: Object<'py>,
-    qd: Object<'py>,
-) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.chain()?, arm => {
-        let fields = [("q", &q), ("qd", &qd)];
-        each_row(py, fields, Shape::Joints, |[q, qd], out| {
-            out.extend(dynamics::coriolis(arm, &q, &qd));
-        })
-    })
-}
-
-/// Gravity load G(q) [N m], the effort that holds the arm still at `q` [rad], of shape (links,) or (n, links).
-#[pyfunction]
-pub(crate) fn gravity_load<'py>(
-    py: Python<'py>,
-    arm: Given<'py>,
-    q: Object<'py>,
-) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.chain()?, arm => {
-        let fields = [("q", &q)];
-        each_row(py, fields, Shape::Joints, |[q], out| {
-            out.extend(dynamics::gravity_load(arm, &q));
-        })
-    })
+of_rows! {
+    /// Mass matrix M(q) [kg m²] at joint positions `q` [rad], of shape (links,) or (n, links): (links, links) or (n,
+    /// links, links).
+    mass_matrix(arm, q) -> Square, out => out.extend(dynamics::mass_matrix(arm, &q).as_flattened());
+    /// Coriolis and centrifugal effort C(q, qd) qd [N m] at positions `q` [rad] and rates `qd` [rad/s], of shape
+    /// (links,) or (n, links).
+    coriolis(arm, q, qd) -> Joints, out => out.extend(dynamics::coriolis(arm, &q, &qd));
+    /// Gravity load G(q) [N m], the effort that holds the arm still at `q` [rad], of shape (links,) or (n, links).
+    gravity_load(arm, q) -> Joints, out => out.extend(dynamics::gravity_load(arm, &q));
+    /// The effort [N m] that gives the accelerations `qdd` [rad/s²] at `q` [rad] and `qd` [rad/s], each of shape
+    /// (links,) or (n, links).
+    inverse_dynamics(arm, q, qd, qdd) -> Joints, out => out.extend(dynamics::inverse_dynamics(arm, &q, &qd, &qdd));
+    /// Kinetic energy [J] at `q` [rad] and `qd` [rad/s], of shape (links,) or (n, links): a number, or (n,).
+    kinetic_energy(arm, q, qd) -> One, out => out.push(dynamics::kinetic_energy(arm, &q, &qd));
+    /// Potential energy [J] at `q` [rad], of shape (links,) or (n, links), zero with the arm along the x axis: a
+    /// number, or (n,).
+    potential_energy(arm, q) -> One, out => out.push(dynamics::potential_energy(arm, &q));
+    /// Position of the end effector [m], (2,) or (n, 2), at `q` [rad] of shape (links,) or (n, links).
+    end_effector(arm, q) -> Point, out => out.extend(kinematics::forward(arm.lengths(), &q).position.to_array());
 }
 
 /// Joint accelerations [rad/s²] under `effort` [N m] at `q` [rad] and `qd` [rad/s], each of shape (links,) or (n,
@@ -157,7 +151,7 @@ pub(crate) fn forward_dynamics<'py>(
     qd: Object<'py>,
     effort: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.chain()?, arm => {
+    for_either!(&arm.chain()?, arm => {
         let fields = [("q", &q), ("qd", &qd), ("effort", &effort)];
         all_rows(py, arm.lengths().len(), fields, Shape::Joints, |rows, count, out| {
             forward_dynamics_of_rows(arm, rows, count, out);
@@ -193,71 +187,6 @@ fn forward_dynamics_of_rows<const N: usize>(
     }
 }
 
-/// The effort [N m] that gives the accelerations `qdd` [rad/s²] at `q` [rad] and `qd` [rad/s], each of shape (links,)
-/// or (n, links).
-#[pyfunction]
-pub(crate) fn inverse_dynamics<'py>(
-    py: Python<'py>,
-    arm: Given<'py>,
-    q: Object<'py>,
-    qd: Object<'py>,
-    qdd: Object<'py>,
-) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.chain()?, arm => {
-        let fields = [("q", &q), ("qd", &qd), ("qdd", &qdd)];
-        each_row(py, fields, Shape::Joints, |[q, qd, qdd], out| {
-            out.extend(dynamics::inverse_dynamics(arm, &q, &qd, &qdd));
-        })
-    })
-}
-
-/// Kinetic energy [J] at `q` [rad] and `qd` [rad/s], of shape (links,) or (n, links): a number, or (n,).
-#[pyfunction]
-pub(crate) fn kinetic_energy<'py>(
-    py: Python<'py>,
-    arm: Given<'py>,
-    q: Object<'py>,
-    qd: Object<'py>,
-) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.chain()?, arm => {
-        let fields = [("q", &q), ("qd", &qd)];
-        each_row(py, fields, Shape::One, |[q, qd], out| {
-            out.push(dynamics::kinetic_energy(arm, &q, &qd));
-        })
-    })
-}
-
-/// Potential energy [J] at `q` [rad], of shape (links,) or (n, links), zero with the arm along the x axis: a number,
-/// or (n,).
-#[pyfunction]
-pub(crate) fn potential_energy<'py>(
-    py: Python<'py>,
-    arm: Given<'py>,
-    q: Object<'py>,
-) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.chain()?, arm => {
-        let fields = [("q", &q)];
-        each_row(py, fields, Shape::One, |[q], out| {
-            out.push(dynamics::potential_energy(arm, &q));
-        })
-    })
-}
-
-/// Position of the end effector [m], (2,) or (n, 2), at `q` [rad] of shape (links,) or (n, links).
-#[pyfunction]
-pub(crate) fn end_effector<'py>(
-    py: Python<'py>,
-    arm: Given<'py>,
-    q: Object<'py>,
-) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.chain()?, arm => {
-        let fields = [("q", &q)];
-        each_row(py, fields, Shape::Point, |[q], out| {
-            out.extend(kinematics::forward(arm.lengths(), &q).position.to_array());
-        })
-    })
-}
-
 /// Joint positions [rad], (links,), each in (-pi, pi], that put the end effector on (`x`, `y`) [m].
 ///
 /// `phi` [rad] is the heading of the last of 3 links, and is ignored for 2. `present` [rad] selects among the
@@ -277,7 +206,7 @@ pub(crate) fn inverse_kinematics<'py>(
         fields::number("y", y, Bound::Finite)?,
     );
     let phi = phi.map(|phi| phi.read("phi")).transpose()?;
-    for_either!(Chain, &arm.chain()?, arm => {
+    for_either!(&arm.chain()?, arm => {
         if let (3, Some(phi)) = (arm.lengths().len(), phi) {
             fields::number("phi", Real::Is(phi), Bound::Finite)?;
         }

@@ -4,13 +4,14 @@
 
 use std::convert::Infallible;
 use std::fmt::{self, Display, Formatter};
+use std::ops::RangeInclusive;
 
 use numpy::PyUntypedArray;
 use pendularm::math::integrator::{Method, UnknownMethod};
 use pyo3::Borrowed;
 use pyo3::exceptions::{PyOverflowError, PyValueError};
 use pyo3::intern;
-use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyErr, PyResult};
+use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyErr, PyResult, pyfunction};
 use pyo3::types::{PyBool, PyFloat, PyInt, PyList, PyStringMethods, PyTuple};
 
 /// Most dimensions of an array, and so the largest depth of nested lists.
@@ -78,6 +79,7 @@ pub(crate) fn beyond(field: &str) -> PyErr {
 }
 
 /// Whether some of these numbers are masked. NumPy also reads masked numbers inside a list.
+#[pyfunction]
 pub(crate) fn is_masked(value: &Object<'_>) -> PyResult<bool> {
     is_masked_within(value, MOST_DIMENSIONS)
 }
@@ -113,6 +115,7 @@ fn is_masked_within(value: &Object<'_>, depth: usize) -> PyResult<bool> {
 }
 
 /// Whether this, or a part of it, has more than [`MOST_LISTED`] entries and would be copied entry by entry.
+#[pyfunction]
 pub(crate) fn is_too_long(value: &Object<'_>) -> PyResult<bool> {
     is_too_long_within(value, MOST_DIMENSIONS)
 }
@@ -187,10 +190,26 @@ pub(crate) type Real = Argument<f64>;
 pub(crate) type Whole = Argument<u64>;
 /// True or false, Python's or NumPy's.
 pub(crate) type Flag = Argument<bool>;
-/// A name.
+/// The name of a method.
 pub(crate) type Name = Argument<String>;
 
-impl<'a, 'py, T: LosslessArgument<'a, 'py>> FromPyObject<'a, 'py> for Argument<T> {
+/// A type of arguments.
+pub(crate) trait LosslessArgument {
+    /// The valid values, as in a refusal.
+    fn rule() -> String;
+
+    /// Whether Python's conversion of a value to this type loses nothing.
+    fn is_lossless(_value: Borrowed<'_, '_, PyAny>) -> bool {
+        true
+    }
+
+    /// The refusal of a value that does not have this type.
+    fn refusal(field: &str, value: &Other) -> PyErr {
+        refused(format_args!("{field} {}, got {value}", Self::rule()))
+    }
+}
+
+impl<'a, 'py, T: LosslessArgument + FromPyObject<'a, 'py>> FromPyObject<'a, 'py> for Argument<T> {
     type Error = Infallible;
 
     fn extract(value: Borrowed<'a, 'py, PyAny>) -> Result<Self, Infallible> {
@@ -206,15 +225,21 @@ impl<'a, 'py, T: LosslessArgument<'a, 'py>> FromPyObject<'a, 'py> for Argument<T
     }
 }
 
-/// A type of arguments.
-pub(crate) trait LosslessArgument<'a, 'py>: FromPyObject<'a, 'py> {
-    /// Whether Python's conversion of a value to this type loses nothing.
-    fn is_lossless(_value: Borrowed<'a, 'py, PyAny>) -> bool {
-        true
+impl<T: LosslessArgument> Argument<T> {
+    /// The value, if it has the type.
+    pub(crate) fn read(self, field: &str) -> PyResult<T> {
+        match self {
+            Self::Is(value) => Ok(value),
+            Self::Other(value) => Err(T::refusal(field, &value)),
+        }
     }
 }
 
-impl LosslessArgument<'_, '_> for f64 {
+impl LosslessArgument for f64 {
+    fn rule() -> String {
+        "must be a number".to_owned()
+    }
+
     /// NumPy's complex numbers would lose their imaginary parts, and masked ones their masks.
     fn is_lossless(value: Borrowed<'_, '_, PyAny>) -> bool {
         let is_real = || {
@@ -228,77 +253,61 @@ impl LosslessArgument<'_, '_> for f64 {
         };
         value.is_instance_of::<PyFloat>() || is_real().unwrap_or(false)
     }
+
+    fn refusal(field: &str, value: &Other) -> PyErr {
+        if value.is_beyond {
+            return beyond(field);
+        }
+        refused(format_args!("{field} {}, got {value}", Self::rule()))
+    }
 }
 
-impl LosslessArgument<'_, '_> for u64 {
+impl LosslessArgument for u64 {
+    fn rule() -> String {
+        "must be a whole number, at least 0 and less than 2^64".to_owned()
+    }
+
     /// Booleans would count as 0 and 1, and masked numbers would lose their masks.
     fn is_lossless(value: Borrowed<'_, '_, PyAny>) -> bool {
         !value.is_instance_of::<PyBool>() && is_masked(&value).is_ok_and(|is_masked| !is_masked)
     }
 }
 
-impl LosslessArgument<'_, '_> for bool {}
-impl LosslessArgument<'_, '_> for String {}
-
-impl Real {
-    /// Any number.
-    pub(crate) fn read(self, field: &str) -> PyResult<f64> {
-        match self {
-            Self::Is(value) => Ok(value),
-            Self::Other(value) if value.is_beyond => Err(beyond(field)),
-            Self::Other(value) => Err(refused(format_args!(
-                "{field} must be a number, got {value}"
-            ))),
-        }
+impl LosslessArgument for bool {
+    fn rule() -> String {
+        "must be True or False".to_owned()
     }
 }
 
-impl Flag {
-    /// The boolean.
-    pub(crate) fn read(self, field: &str) -> PyResult<bool> {
-        match self {
-            Self::Is(value) => Ok(value),
-            Self::Other(value) => Err(refused(format_args!(
-                "{field} must be True or False, got {value}"
-            ))),
-        }
+impl LosslessArgument for String {
+    fn rule() -> String {
+        UnknownMethod.to_string()
     }
 }
 
 impl Name {
     /// The method of this name.
     pub(crate) fn method(self, field: &str) -> PyResult<Method> {
-        match self {
-            Self::Is(name) => method(field, &name),
-            Self::Other(value) => Err(refused(format_args!(
-                "{field} {UnknownMethod}, got {value}"
-            ))),
-        }
+        method(field, &self.read(field)?)
     }
 }
 
 impl Whole {
-    /// Any number.
-    pub(crate) fn read(self, field: &str) -> PyResult<u64> {
-        match self {
-            Self::Is(value) => Ok(value),
-            Self::Other(value) => Err(refused(format_args!(
-                "{field} must be a whole number, at least 0 and less than 2^64, got {value}"
-            ))),
-        }
-    }
-
     /// The number, from 1 to `most`.
     pub(crate) fn up_to(self, most: usize, field: &str) -> PyResult<usize> {
-        let refusal = |value: &dyn Display| {
-            refused(format_args!(
-                "{field} must be between 1 and {most}, got {value}"
-            ))
-        };
+        self.within(
+            1..=most,
+            format_args!("{field} must be between 1 and {most}"),
+        )
+    }
+
+    /// The number in a range. `rule` is the start of the refusal of another value.
+    fn within(self, range: RangeInclusive<usize>, rule: impl Display) -> PyResult<usize> {
+        let refusal = |value: &dyn Display| refused(format_args!("{rule}, got {value}"));
         match self {
             Self::Is(value) => usize::try_from(value)
                 .ok()
-                .filter(|value| (1..=most).contains(value))
+                .filter(|value| range.contains(value))
                 .ok_or_else(|| refusal(&value)),
             Self::Other(value) => Err(refusal(&value)),
         }
@@ -323,12 +332,7 @@ pub(crate) fn number(field: &str, value: Real, bound: Bound) -> PyResult<f64> {
 
 /// 2 or 3.
 pub(crate) fn links(value: Whole) -> PyResult<usize> {
-    match value {
-        Whole::Is(2) => Ok(2),
-        Whole::Is(3) => Ok(3),
-        Whole::Is(value) => Err(refused(format_args!("links must be 2 or 3, got {value}"))),
-        Whole::Other(value) => Err(refused(format_args!("links must be 2 or 3, got {value}"))),
-    }
+    value.within(2..=3, "links must be 2 or 3")
 }
 
 /// A method by its name.

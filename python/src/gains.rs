@@ -15,17 +15,20 @@ use crate::fields::{self, Bound, Held, Object, Whole, refused, shown};
 #[pyfunction]
 #[pyo3(signature = (links=Whole::Is(2)), text_signature = "(links=2)")]
 pub(crate) fn default_gains(py: Python<'_>, links: Whole) -> PyResult<Held<'_, PyDict>> {
-    fn listed<const N: usize>(gains: Gains<N>) -> [(&'static str, Vec<f64>); 3] {
-        [("kp", gains.kp), ("ki", gains.ki), ("kd", gains.kd)]
-            .map(|(name, gain)| (name, gain.to_vec()))
+    match fields::links(links)? {
+        2 => listed(py, &Gains::<2>::default()),
+        _ => listed(py, &Gains::<3>::default()),
     }
-    let gains = match fields::links(links)? {
-        2 => listed(Gains::<2>::default()),
-        _ => listed(Gains::<3>::default()),
-    };
+}
+
+/// Gains by name, as a result.
+pub(crate) fn listed<'py, const N: usize>(
+    py: Python<'py>,
+    gains: &Gains<N>,
+) -> PyResult<Held<'py, PyDict>> {
     let found = PyDict::new(py);
-    for (name, values) in gains {
-        found.set_item(name, values.to_pyarray(py))?;
+    for (name, gain) in [("kp", gains.kp), ("ki", gains.ki), ("kd", gains.kd)] {
+        found.set_item(name, gain.to_pyarray(py))?;
     }
     Ok(found)
 }

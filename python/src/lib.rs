@@ -22,12 +22,16 @@ mod native {
     #[pymodule_export]
     use crate::arm::Arm;
     #[pymodule_export]
+    use crate::arrays::as_doubles;
+    #[pymodule_export]
     use crate::batch::Batch;
     #[pymodule_export]
     use crate::dynamics::{
         coriolis, end_effector, forward_dynamics, gravity_load, inverse_dynamics,
         inverse_kinematics, kinetic_energy, mass_matrix, potential_energy,
     };
+    #[pymodule_export]
+    use crate::fields::{is_masked, is_too_long};
     #[pymodule_export]
     use crate::gains::default_gains;
     #[pymodule_export]

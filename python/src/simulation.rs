@@ -15,7 +15,7 @@ use pyo3::IntoPyObject;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyclass, pymethods};
 use pyo3::types::{PyDict, PyMappingProxy};
 
-use crate::arm::{Arm, Chain, Given, for_either, or_default};
+use crate::arm::{Arm, Chain, Either, Given, for_either, or_default};
 use crate::arrays::{joints, joints_or, property};
 use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
 use crate::gains;
@@ -25,13 +25,6 @@ use crate::patience::{hold, until_done};
 const STEPS_PER_LOOK: u64 = 1000;
 
 type ArrayProperty<'py> = Held<'py, PyArray1<f64>>;
-
-/// The number of links never changes. A lock protects the state, because threads may share a simulation.
-#[derive(Debug)]
-enum Either {
-    Two(Mutex<Loop<2>>),
-    Three(Mutex<Loop<3>>),
-}
 
 /// The step at which a simulation diverged.
 #[pyclass(frozen, eq, get_all, module = "pendularm")]
@@ -77,7 +70,8 @@ impl Divergence {
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Simulation {
-    own: Either,
+    /// The number of links never changes. A lock protects the state, because threads may share a simulation.
+    own: Either<Mutex<Loop<2>>, Mutex<Loop<3>>>,
 }
 
 /// A simulation of this arm.
@@ -133,7 +127,7 @@ impl Simulation {
     #[pyo3(signature = (steps=Whole::Is(1), effort=None), text_signature = "($self, steps=1, effort=None)")]
     fn step(&self, py: Python<'_>, steps: Whole, effort: Option<&Object<'_>>) -> PyResult<u64> {
         let steps = steps.read("steps")?;
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let effort = effort.map(|effort| joints("effort", effort, Bound::Finite)).transpose()?;
             take(py, one, steps, effort)
         })
@@ -143,14 +137,14 @@ impl Simulation {
     /// divergence end, and a control period begins. Gains, arm, method, timestep, control period and the
     /// controller's on/off state do not change.
     fn reset(&self, py: Python<'_>) {
-        for_either!(Either, &self.own, one => hold(py, one).reset());
+        for_either!(&self.own, one => hold(py, one).reset());
     }
 
     /// Turns the controller on or off. From off to on the integral starts at zero.
     #[pyo3(signature = (data=Flag::Is(true)), text_signature = "($self, data=True)")]
     fn enable(&self, py: Python<'_>, data: Flag) -> PyResult<()> {
         let data = data.read("data")?;
-        for_either!(Either, &self.own, one => hold(py, one).enable(data));
+        for_either!(&self.own, one => hold(py, one).enable(data));
         Ok(())
     }
 
@@ -162,8 +156,11 @@ impl Simulation {
         positions: &Object<'_>,
         velocities: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        for_either!(Either, &self.own, one => {
-            let setpoint = read_setpoint(positions, velocities)?;
+        for_either!(&self.own, one => {
+            let setpoint = Setpoint {
+                position: joints("positions", positions, Bound::Finite)?,
+                velocity: joints_or("velocities", velocities, Bound::Finite, [0.0; _])?,
+            };
             hold(py, one).set_setpoint(setpoint);
         });
         Ok(())
@@ -179,7 +176,7 @@ impl Simulation {
         ki: Option<&Object<'_>>,
         kd: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let present = *hold(py, one).pid().gains();
             let gains = Gains {
                 kp: joints_or("kp", kp, Bound::NotNegative, present.kp)?,
@@ -200,7 +197,7 @@ impl Simulation {
         position: &Object<'_>,
         velocity: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let state = State {
                 position: joints("position", position, Bound::Finite)?,
                 velocity: joints_or("velocity", velocity, Bound::Finite, [0.0; _])?,
@@ -214,7 +211,7 @@ impl Simulation {
     /// replaces an earlier disturbance. With the controller off it is the only effort.
     fn disturb(&self, py: Python<'_>, effort: &Object<'_>, duration: Real) -> PyResult<()> {
         let duration = fields::number("duration", duration, Bound::Positive)?;
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let effort = joints("effort", effort, Bound::Finite)?;
             hold(py, one).disturb(effort, duration);
         });
@@ -245,40 +242,37 @@ impl Simulation {
     /// Number of links, 2 or 3.
     #[getter]
     fn links(&self) -> usize {
-        match &self.own {
-            Either::Two(_) => 2,
-            Either::Three(_) => 3,
-        }
+        self.own.links()
     }
 
     /// Joint positions [rad], (links,), never wrapped.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
-        for_either!(Either, &self.own, one => property(py, &hold(py, one).state().position))
+        for_either!(&self.own, one => property(py, &hold(py, one).state().position))
     }
 
     /// Joint rates [rad/s], (links,).
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
-        for_either!(Either, &self.own, one => property(py, &hold(py, one).state().velocity))
+        for_either!(&self.own, one => property(py, &hold(py, one).state().velocity))
     }
 
     /// Effort of the latest step [N m], (links,): the controller's plus the disturbance's.
     #[getter]
     fn effort<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
-        for_either!(Either, &self.own, one => property(py, hold(py, one).effort()))
+        for_either!(&self.own, one => property(py, hold(py, one).effort()))
     }
 
     /// Integral of the position error [rad s], (links,).
     #[getter]
     fn integral<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
-        for_either!(Either, &self.own, one => property(py, hold(py, one).pid().integral()))
+        for_either!(&self.own, one => property(py, hold(py, one).pid().integral()))
     }
 
     /// The setpoint: positions [rad] and velocities [rad/s], (links,) each.
     #[getter]
     fn setpoint<'py>(&self, py: Python<'py>) -> PyResult<(ArrayProperty<'py>, ArrayProperty<'py>)> {
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let one = hold(py, one);
             let Setpoint { position, velocity } = one.pid().setpoint();
             Ok((property(py, position)?, property(py, velocity)?))
@@ -289,7 +283,7 @@ impl Simulation {
     #[getter]
     fn gains<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyMappingProxy>> {
         let found = PyDict::new(py);
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let one = hold(py, one);
             let Gains { kp, ki, kd } = one.pid().gains();
             for (name, gain) in [("kp", kp), ("ki", ki), ("kd", kd)] {
@@ -302,32 +296,32 @@ impl Simulation {
     /// Whether the controller is on.
     #[getter]
     fn enabled(&self, py: Python<'_>) -> bool {
-        for_either!(Either, &self.own, one => hold(py, one).pid().is_enabled())
+        for_either!(&self.own, one => hold(py, one).pid().is_enabled())
     }
 
     /// The method that takes the steps: `euler`, `midpoint`, `verlet` or `rk4`.
     #[getter]
     fn method(&self, py: Python<'_>) -> &'static str {
-        for_either!(Either, &self.own, one => hold(py, one).method().name())
+        for_either!(&self.own, one => hold(py, one).method().name())
     }
 
     #[setter]
     fn set_method(&self, py: Python<'_>, method: Name) -> PyResult<()> {
         let method = method.method("method")?;
-        for_either!(Either, &self.own, one => hold(py, one).set_method(method));
+        for_either!(&self.own, one => hold(py, one).set_method(method));
         Ok(())
     }
 
     /// Length of a step [s].
     #[getter]
     fn timestep(&self, py: Python<'_>) -> f64 {
-        for_either!(Either, &self.own, one => hold(py, one).timestep())
+        for_either!(&self.own, one => hold(py, one).timestep())
     }
 
     #[setter]
     fn set_timestep(&self, py: Python<'_>, timestep: Real) -> PyResult<()> {
         let timestep = fields::number("timestep", timestep, Bound::Positive)?;
-        for_either!(Either, &self.own, one => hold(py, one).set_timestep(timestep));
+        for_either!(&self.own, one => hold(py, one).set_timestep(timestep));
         Ok(())
     }
 
@@ -335,13 +329,13 @@ impl Simulation {
     /// timestep begins a period.
     #[getter]
     fn control_period(&self, py: Python<'_>) -> f64 {
-        for_either!(Either, &self.own, one => hold(py, one).control_period()).period
+        for_either!(&self.own, one => hold(py, one).control_period()).period
     }
 
     #[setter]
     fn set_control_period(&self, py: Python<'_>, control_period: Real) -> PyResult<()> {
         let period = fields::number("control_period", control_period, Bound::NotNegative)?;
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let mut one = hold(py, one);
             let present = one.control_period();
             one.set_control_period(ControlPeriod { period, ..present });
@@ -352,7 +346,7 @@ impl Simulation {
     /// The control period in whole timesteps [s]: the nearest number, at least 1.
     #[getter]
     fn effective_control_period(&self, py: Python<'_>) -> f64 {
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let one = hold(py, one);
             one.control_period().effective(one.timestep())
         })
@@ -361,13 +355,13 @@ impl Simulation {
     /// Whether the controller's effort is applied one control period after its state was read.
     #[getter]
     fn control_delay(&self, py: Python<'_>) -> bool {
-        for_either!(Either, &self.own, one => hold(py, one).control_period()).delay
+        for_either!(&self.own, one => hold(py, one).control_period()).delay
     }
 
     #[setter]
     fn set_control_delay(&self, py: Python<'_>, control_delay: Flag) -> PyResult<()> {
         let delay = control_delay.read("control_delay")?;
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let mut one = hold(py, one);
             let present = one.control_period();
             one.set_control_period(ControlPeriod { delay, ..present });
@@ -378,19 +372,19 @@ impl Simulation {
     /// Simulation time since the reset [s].
     #[getter]
     fn time(&self, py: Python<'_>) -> f64 {
-        for_either!(Either, &self.own, one => hold(py, one).time())
+        for_either!(&self.own, one => hold(py, one).time())
     }
 
     /// Steps taken since the reset.
     #[getter]
     fn steps(&self, py: Python<'_>) -> u64 {
-        for_either!(Either, &self.own, one => hold(py, one).steps())
+        for_either!(&self.own, one => hold(py, one).steps())
     }
 
     /// Kinetic plus potential energy [J], zero at rest along the x axis.
     #[getter]
     fn energy(&self, py: Python<'_>) -> f64 {
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let one = hold(py, one);
             energy(one.arm(), one.state())
         })
@@ -399,7 +393,7 @@ impl Simulation {
     /// Position of the end effector [m], (2,).
     #[getter]
     fn end_effector<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let one = hold(py, one);
             let tip = forward(one.arm().lengths(), &one.state().position);
             property(py, &tip.position.to_array())
@@ -410,14 +404,14 @@ impl Simulation {
     /// after it.
     #[getter]
     fn divergence(&self, py: Python<'_>) -> Option<Divergence> {
-        for_either!(Either, &self.own, one => hold(py, one).divergence()).map(|found| Divergence {
+        for_either!(&self.own, one => hold(py, one).divergence()).map(|found| Divergence {
             step: found.step,
             time: found.time,
         })
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {
-        for_either!(Either, &self.own, one => {
+        for_either!(&self.own, one => {
             let one = hold(py, one);
             format!(
                 "<Simulation of {} links at {} s, {} at {} s>",
@@ -449,15 +443,5 @@ fn take<const N: usize>(
         }
         left -= advanced;
         (left == 0 || advanced < piece).then_some(steps - left)
-    })
-}
-
-fn read_setpoint<const N: usize>(
-    positions: &Object<'_>,
-    velocities: Option<&Object<'_>>,
-) -> PyResult<Setpoint<N>> {
-    Ok(Setpoint {
-        position: joints("positions", positions, Bound::Finite)?,
-        velocity: joints_or("velocities", velocities, Bound::Finite, [0.0; N])?,
     })
 }

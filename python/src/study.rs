@@ -1,10 +1,12 @@
 //! The study's predictions and runs, with the fields of the services `/study/*`.
 //!
+//! The functions of the package's `study.py` have the signatures and the defaults. They pass their arguments in a dict.
+//!
 //! **Invariant:** a result has the members of the service's answer, with the same names.
 
 use std::time::{Duration, Instant};
 
-use numpy::{IntoPyArray, PyArrayMethods, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArrayMethods, ToPyArray};
 use pendularm::math::arm::{Arm as Rods, State};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::ControlPeriod;
@@ -16,10 +18,10 @@ use pendularm::study::paused::Paused;
 use pendularm::study::planner::{self, Planned, Task};
 use pendularm::study::rollout::{Rollout, RolloutRequest, rollout as rollout_of};
 use pendularm::study::stability::{Limits, search_limits};
-use pyo3::prelude::{PyDictMethods, PyResult, Python, pyfunction};
+use pyo3::prelude::{FromPyObject, PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
-use crate::arm::{Chain, Given, for_either, or_default};
+use crate::arm::{Given, for_either, or_default};
 use crate::arrays::{joints_or, room};
 use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
 use crate::gains;
@@ -27,21 +29,10 @@ use crate::patience::until_done;
 
 // ---- stability ------------------------------------------------------------------------------------------------------
 
-#[pyfunction]
-#[pyo3(
-    signature = (
-        arm=None, *, integrator=Name::Is("rk4".to_owned()), gains=None, setpoint=None, q=None, qd=None,
-        control_period=Real::Is(0.0)
-    ),
-    text_signature = "(arm=None, *, integrator=\"rk4\", gains=None, setpoint=None, q=None, qd=None, \
-                      control_period=0.0)"
-)]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "they are the fields of the service, by name"
-)]
-pub(crate) fn stability<'py>(
-    py: Python<'py>,
+/// The arguments of [`stability`].
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct StabilityArguments<'py> {
     arm: Option<Given<'py>>,
     integrator: Name,
     gains: Option<Object<'py>>,
@@ -49,10 +40,25 @@ pub(crate) fn stability<'py>(
     q: Option<Object<'py>>,
     qd: Option<Object<'py>>,
     control_period: Real,
+}
+
+#[pyfunction]
+#[pyo3(signature = (arguments, /))]
+pub(crate) fn stability<'py>(
+    py: Python<'py>,
+    arguments: StabilityArguments<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
-    let method = integrator.method("integrator")?;
-    let period = read_period(control_period)?;
-    for_either!(Chain, or_default(arm)?, arm => {
+    let StabilityArguments {
+        arm,
+        gains,
+        setpoint,
+        q,
+        qd,
+        ..
+    } = arguments;
+    let method = arguments.integrator.method("integrator")?;
+    let period = read_period(arguments.control_period)?;
+    for_either!(or_default(arm)?, arm => {
         let gains = gains::read(gains.as_ref(), Gains::default())?;
         let setpoint = Setpoint::at(joints_or("setpoint", setpoint.as_ref(), Bound::Finite, [0.0; _])?);
         let control = ControlLoop::new(arm, gains, setpoint).with_method(method).with_period(period);
@@ -123,22 +129,10 @@ fn read_state<const N: usize>(
 
 // ---- rollout --------------------------------------------------------------------------------------------------------
 
-#[pyfunction]
-#[pyo3(
-    signature = (
-        arm=None, *, q0=None, qdot0=None, duration=Real::Is(10.0), timestep=Real::Is(0.001),
-        integrator=Name::Is("rk4".to_owned()), gains=None, setpoint=None, samples=Whole::Is(1001),
-        reference=Flag::Is(false), control_period=Real::Is(0.0)
-    ),
-    text_signature = "(arm=None, *, q0=None, qdot0=None, duration=10.0, timestep=0.001, integrator=\"rk4\", \
-                      gains=None, setpoint=None, samples=1001, reference=False, control_period=0.0)"
-)]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "they are the fields of the service, by name"
-)]
-pub(crate) fn rollout<'py>(
-    py: Python<'py>,
+/// The arguments of [`rollout`].
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct RolloutArguments<'py> {
     arm: Option<Given<'py>>,
     q0: Option<Object<'py>>,
     qdot0: Option<Object<'py>>,
@@ -150,13 +144,29 @@ pub(crate) fn rollout<'py>(
     samples: Whole,
     reference: Flag,
     control_period: Real,
+}
+
+#[pyfunction]
+#[pyo3(signature = (arguments, /))]
+pub(crate) fn rollout<'py>(
+    py: Python<'py>,
+    arguments: RolloutArguments<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
-    let (duration, timestep) = (duration.read("duration")?, timestep.read("timestep")?);
-    let samples = samples.read("samples")?;
-    let reference = reference.read("reference")?;
-    let period = read_period(control_period)?;
-    let method = integrator.method("integrator")?;
-    for_either!(Chain, or_default(arm)?, arm => {
+    let RolloutArguments {
+        arm,
+        q0,
+        qdot0,
+        gains,
+        setpoint,
+        ..
+    } = arguments;
+    let duration = arguments.duration.read("duration")?;
+    let timestep = arguments.timestep.read("timestep")?;
+    let samples = arguments.samples.read("samples")?;
+    let reference = arguments.reference.read("reference")?;
+    let period = read_period(arguments.control_period)?;
+    let method = arguments.integrator.method("integrator")?;
+    for_either!(or_default(arm)?, arm => {
         run(py, RolloutRequest {
             control: read_loop(arm, gains.as_ref(), setpoint.as_ref())?
                 .with_method(method)
@@ -227,25 +237,27 @@ fn listed_run<'py, const N: usize>(
 
 // ---- gains ----------------------------------------------------------------------------------------------------------
 
-#[pyfunction]
-#[pyo3(
-    signature = (
-        arm=None, *, settling_time=Real::Is(4.0), margin=Real::Is(1.25), timestep=Real::Is(0.001),
-        integrator=Name::Is("rk4".to_owned())
-    ),
-    text_signature = "(arm=None, *, settling_time=4.0, margin=1.25, timestep=0.001, integrator=\"rk4\")"
-)]
-pub(crate) fn suggest_gains<'py>(
-    py: Python<'py>,
+/// The arguments of [`suggest_gains`].
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct GainsArguments<'py> {
     arm: Option<Given<'py>>,
     settling_time: Real,
     margin: Real,
     timestep: Real,
     integrator: Name,
+}
+
+#[pyfunction]
+#[pyo3(signature = (arguments, /))]
+pub(crate) fn suggest_gains<'py>(
+    py: Python<'py>,
+    arguments: GainsArguments<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
+    let settling_time = arguments.settling_time;
     let requirements = GainsRequirements {
         settling_time: fields::number("settling_time", settling_time, Bound::Positive)?,
-        margin: fields::number("margin", margin, Bound::Positive)?,
+        margin: fields::number("margin", arguments.margin, Bound::Positive)?,
     };
     if requirements.margin < 1.0 {
         return Err(refused(format_args!(
@@ -253,16 +265,13 @@ pub(crate) fn suggest_gains<'py>(
             requirements.margin
         )));
     }
-    let method = integrator.method("integrator")?;
-    let timestep = fields::number("timestep", timestep, Bound::Positive)?;
-    for_either!(Chain, or_default(arm)?, arm => {
+    let method = arguments.integrator.method("integrator")?;
+    let timestep = fields::number("timestep", arguments.timestep, Bound::Positive)?;
+    for_either!(or_default(arguments.arm)?, arm => {
         let control = ControlLoop::free(arm).with_method(method).with_timestep(timestep);
         let mut search = Paused::new(search_gains(control, requirements));
         let found = until_done(py, || search.advance())?.map_err(refused)?;
-        let listed = PyDict::new(py);
-        listed.set_item("kp", found.gains.kp.to_pyarray(py))?;
-        listed.set_item("ki", found.gains.ki.to_pyarray(py))?;
-        listed.set_item("kd", found.gains.kd.to_pyarray(py))?;
+        let listed = gains::listed(py, &found.gains)?;
         listed.set_item("timestep_limit", found.limit)?;
         listed.set_item("certified", found.certified)?;
         listed.set_item("margin", found.limit.map(|limit| limit / timestep))?;
@@ -273,21 +282,10 @@ pub(crate) fn suggest_gains<'py>(
 
 // ---- plan -----------------------------------------------------------------------------------------------------------
 
-#[pyfunction]
-#[pyo3(
-    signature = (
-        error, arm=None, *, duration=None, q0=None, qdot0=None, gains=None, setpoint=None,
-        control_period=Real::Is(0.0)
-    ),
-    text_signature = "(error, arm=None, *, duration=None, q0=None, qdot0=None, gains=None, setpoint=None, \
-                      control_period=0.0)"
-)]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "they are the fields of the service, by name"
-)]
-pub(crate) fn plan<'py>(
-    py: Python<'py>,
+/// The arguments of [`plan`].
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct PlanArguments<'py> {
     error: Real,
     arm: Option<Given<'py>>,
     duration: Option<Real>,
@@ -296,10 +294,26 @@ pub(crate) fn plan<'py>(
     gains: Option<Object<'py>>,
     setpoint: Option<Object<'py>>,
     control_period: Real,
+}
+
+#[pyfunction]
+#[pyo3(signature = (arguments, /))]
+pub(crate) fn plan<'py>(
+    py: Python<'py>,
+    arguments: PlanArguments<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
-    let error = fields::number("error", error, Bound::Positive)?;
-    let period = read_period(control_period)?;
-    for_either!(Chain, or_default(arm)?, arm => {
+    let PlanArguments {
+        arm,
+        duration,
+        q0,
+        qdot0,
+        gains,
+        setpoint,
+        ..
+    } = arguments;
+    let error = fields::number("error", arguments.error, Bound::Positive)?;
+    let period = read_period(arguments.control_period)?;
+    for_either!(or_default(arm)?, arm => {
         let control = read_loop(arm, gains.as_ref(), setpoint.as_ref())?.with_period(period);
         let usual = if control.is_free() { 10.0 } else { 4.0 };
         let mut planning = Paused::new(planner::plan(Task {
@@ -348,30 +362,13 @@ fn listed_plan<'py>(
     )?;
     found.set_item("error", best.error)?;
     found.set_item("error_uncertainty", planned.uncertainty)?;
-    found.set_item(
-        "methods",
-        all().map(|one| one.method.name()).collect::<Vec<_>>(),
-    )?;
-    found.set_item(
-        "timesteps",
-        all()
-            .map(|one| one.timestep)
-            .collect::<Vec<_>>()
-            .into_pyarray(py),
-    )?;
-    found.set_item(
-        "evaluations",
-        all()
-            .map(|one| one.evaluations)
-            .collect::<Vec<_>>()
-            .into_pyarray(py),
-    )?;
-    found.set_item(
-        "errors",
-        all()
-            .map(|one| one.error)
-            .collect::<Vec<_>>()
-            .into_pyarray(py),
-    )?;
+    let methods: Vec<_> = all().map(|one| one.method.name()).collect();
+    let timesteps = PyArray1::from_iter(py, all().map(|one| one.timestep));
+    let evaluations = PyArray1::from_iter(py, all().map(|one| one.evaluations));
+    let errors = PyArray1::from_iter(py, all().map(|one| one.error));
+    found.set_item("methods", methods)?;
+    found.set_item("timesteps", timesteps)?;
+    found.set_item("evaluations", evaluations)?;
+    found.set_item("errors", errors)?;
     Ok(found)
 }

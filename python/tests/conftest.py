@@ -77,6 +77,12 @@ def links(request: pytest.FixtureRequest) -> int:
     return request.param
 
 
+@pytest.fixture(params=["Pendularm-v0", "PendularmReach-v0"])
+def name(request: pytest.FixtureRequest) -> str:
+    """The name of an environment."""
+    return request.param
+
+
 @pytest.fixture
 def runtime(links: int) -> Iterator[Runtime]:
     one = Runtime("--links", str(links))

@@ -1,10 +1,11 @@
 """The lessons of `course/` run, their key is correct, and their questions accept right answers and reject wrong
 ones."""
 
-import importlib.util
 import math
 import re
+import runpy
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -35,10 +36,7 @@ COMPUTED = {
 
 
 def quiz():
-    spec = importlib.util.spec_from_file_location("quiz", COURSE / "quiz.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return SimpleNamespace(**runpy.run_path(str(COURSE / "quiz.py")))
 
 
 def test_there_are_six_lessons_of_five_questions():

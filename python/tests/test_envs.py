@@ -9,13 +9,6 @@ from gymnasium.vector import AutoresetMode
 import pendularm
 import pendularm.envs
 
-NAMES = ["Pendularm-v0", "PendularmReach-v0"]
-
-
-@pytest.fixture(params=NAMES)
-def name(request):
-    return request.param
-
 
 def test_gymnasiums_checker_passes(name, links):
     env = gymnasium.make(name, links=links)
@@ -290,11 +283,6 @@ def test_an_episode_may_have_no_limit(name, steps):
         truncated = env.step(np.zeros((2, 2), np.float32))[3]
         assert truncated.dtype == np.bool_
         assert not truncated.any()
-
-
-def test_a_step_needs_a_reset():
-    with pytest.raises(gymnasium.error.ResetNeeded):
-        gymnasium.make_vec("Pendularm-v0", 2).step(np.zeros((2, 2), np.float32))
 
 
 @pytest.mark.parametrize(

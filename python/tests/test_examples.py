@@ -1,10 +1,11 @@
 """The examples do what their docstrings say."""
 
-import importlib.util
 import json
+import runpy
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -39,9 +40,7 @@ def test_the_lesson_agrees_with_its_text(tmp_path, play_notebook):
 
 
 def test_a_policy_learns():
-    spec = importlib.util.spec_from_file_location("policy", EXAMPLES / "policy.py")
-    policy = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(policy)
+    policy = SimpleNamespace(**runpy.run_path(str(EXAMPLES / "policy.py")))
     shown = float(" ".join(policy.__doc__.split()).split("the found one, more than ")[1].split()[0].rstrip("."))
     random = np.random.default_rng(0).normal(size=(8, policy.SIZE))
     found = policy.train(generations=40)
@@ -51,9 +50,7 @@ def test_a_policy_learns():
 
 
 def test_the_live_client_knows_the_runtimes_port():
-    spec = importlib.util.spec_from_file_location("live_client", EXAMPLES / "live_client.py")
-    client = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(client)
+    client = SimpleNamespace(**runpy.run_path(str(EXAMPLES / "live_client.py")))
     assert client.address() == ("127.0.0.1", 9095)
     assert client.address("arm.local") == ("arm.local", 9095)
     assert client.address("arm.local:80") == ("arm.local", 80)

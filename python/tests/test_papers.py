@@ -5,8 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
 # The README's other blocks need a runtime, and other tests run them.
 README = (ROOT / "README.md").read_text(encoding="utf-8").split("## From Python")[1].split("\n## ")[0]
@@ -47,8 +45,3 @@ def test_the_manual_runs_from_top_to_bottom(tmp_path):
 def test_the_wheels_own_page_runs(tmp_path):
     for part in blocks((ROOT / "python" / "README.md").read_text(encoding="utf-8")):
         assert "4.0" in run(part, tmp_path)
-
-
-@pytest.mark.parametrize("text", [README, MANUAL], ids=["README", "manual"])
-def test_there_is_python_in_it(text):
-    assert blocks(text)

@@ -9,13 +9,6 @@ from gymnasium.error import DependencyNotInstalled, ResetNeeded
 
 import pendularm.envs
 
-NAMES = ["Pendularm-v0", "PendularmReach-v0"]
-
-
-@pytest.fixture(params=NAMES)
-def name(request):
-    return request.param
-
 
 def test_a_frame_shows_the_arm(name, links):
     env = gymnasium.make(name, links=links, render_mode="rgb_array")

@@ -7,7 +7,7 @@
 //! **Invariant:** bytes that are written by a type here have that type's hash.
 
 use pendularm::protocol::catalog::types::Type;
-use pendularm::protocol::catalog::{Action, Field};
+use pendularm::protocol::catalog::{Action, Field, Service};
 
 use crate::convention::hash::type_hash;
 
@@ -43,12 +43,12 @@ const fn field(name: &'static str, kind: &'static str) -> Field {
 impl ServiceInterface {
     /// The type of one of the arm's services.
     #[must_use]
-    pub fn of_catalogue(name: &'static str, request: &'static [Field], response: &[Field]) -> Self {
-        let mut response = response.to_vec();
-        if name.starts_with(OURS) {
+    pub fn of_catalogue(service: Service) -> Self {
+        let mut response = service.response_fields().to_vec();
+        if service.type_name().starts_with(OURS) {
             response.extend(OUTCOME);
         }
-        Self::new(name, request, &response)
+        Self::new(service.type_name(), service.fields(), &response)
     }
 
     /// A type with these fields in a request and in a response.
@@ -184,7 +184,7 @@ fn kept(text: String) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use pendularm::protocol::catalog::Service;
+    use pendularm::protocol::catalog::Rosapi;
 
     use super::*;
 
@@ -203,10 +203,7 @@ mod tests {
     /// From the code that ROS 2 generates for them.
     #[test]
     fn services_of_ros_2_have_its_hashes() {
-        let names = Service::DescribeParameters.fields();
-        let described = Service::DescribeParameters.response_fields();
-        let name = Service::DescribeParameters.type_name();
-        let one = ServiceInterface::of_catalogue(name, names, described);
+        let one = ServiceInterface::of_catalogue(Service::DescribeParameters);
         assert_eq!(
             one.hash,
             "RIHS01_845b484d71eb0673dae682f2e3ba3c4851a65a3dcfb97bddd82c5b57e91e4cff"
@@ -219,18 +216,20 @@ mod tests {
 
     #[test]
     fn only_our_own_services_have_success_and_message() {
-        let ours = ServiceInterface::of_catalogue("pendularm_interfaces/srv/TrialStop", &[], &[]);
+        let ours = ServiceInterface::of_catalogue(Service::TrialStop);
         assert!(ours.tells_outcome());
         assert_eq!(ours.request.fields, NOTHING);
-        let theirs = ServiceInterface::of_catalogue("rosapi_msgs/srv/Topics", &[], &[]);
+        let theirs = ServiceInterface::of_catalogue(Service::Rosapi(Rosapi::Topics));
         assert!(!theirs.tells_outcome());
-        assert_eq!(theirs.response.fields, NOTHING);
+        let empty = ServiceInterface::new("std_srvs/srv/Empty", &[], &[]);
+        assert_eq!(empty.response.fields, NOTHING);
     }
 
     #[test]
     fn rows_stand_one_behind_the_other() {
-        let rows = [field("positions", "float64[][]")];
-        let one = ServiceInterface::of_catalogue("pendularm_interfaces/srv/Rollout", &[], &rows);
-        assert_eq!(one.response.fields[0].kind, "float64[]");
+        let one = ServiceInterface::of_catalogue(Service::Rollout);
+        let mut fields = one.response.fields.iter();
+        let positions = fields.find(|field| field.name == "positions");
+        assert_eq!(positions.unwrap().kind, "float64[]");
     }
 }

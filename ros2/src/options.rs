@@ -64,47 +64,40 @@ fn command() -> Command {
         .about(ABOUT)
         .after_help(AFTER_HELP)
         .arg(
-            Arg::new("connect")
-                .long("connect")
-                .value_name("ADDRESS")
+            option("connect", "ADDRESS")
                 .default_value("127.0.0.1:9095")
                 .value_parser(read_address)
                 .help("Address of the arm: a port, a host, both, or a URL"),
         )
         .arg(
-            Arg::new("router")
-                .long("router")
-                .value_name("ENDPOINT")
+            option("router", "ENDPOINT")
                 .default_value("tcp/127.0.0.1:7447")
                 .help("Endpoint of a Zenoh router; nothing is encrypted or authenticated"),
         )
         .arg(
-            Arg::new("domain")
-                .long("domain")
-                .value_name("N")
+            option("domain", "N")
                 .default_value("0")
                 .value_parser(value_parser!(u32).range(0..=232))
                 .help("The ROS domain, 0 to 232"),
         )
         .arg(
-            Arg::new("namespace")
-                .long("namespace")
-                .value_name("/NAME")
+            option("namespace", "/NAME")
                 .value_parser(read_namespace)
                 .help("Prefix of every name, for one of several arms"),
         )
+        .arg(option("token", "TOKEN").help(
+            "Token of the arm; prefer the variable ARM_SIM_TOKEN, because other users can see options",
+        ))
         .arg(
-            Arg::new("token").long("token").value_name("TOKEN").help(
-                "Token of the arm; prefer the variable ARM_SIM_TOKEN, because other users can see options",
-            ),
-        )
-        .arg(
-            Arg::new("interfaces")
-                .long("interfaces")
-                .value_name("FOLDER")
+            option("interfaces", "FOLDER")
                 .value_parser(value_parser!(PathBuf))
                 .help("Only write the source of the ROS 2 package pendularm_interfaces into FOLDER"),
         )
+}
+
+/// An option, with the name of its value.
+fn option(name: &'static str, value: &'static str) -> Arg {
+    Arg::new(name).long(name).value_name(value)
 }
 
 /// Host and port.

@@ -53,11 +53,7 @@ fn interfaces() -> BTreeMap<String, String> {
         add(one.name, &[one]);
     }
     for service in Service::ALL {
-        let of = ServiceInterface::of_catalogue(
-            service.type_name(),
-            service.fields(),
-            service.response_fields(),
-        );
+        let of = ServiceInterface::of_catalogue(service);
         add(of.name, &[of.request, of.response]);
     }
     for action in Action::ALL {

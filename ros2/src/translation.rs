@@ -120,11 +120,7 @@ mod tests {
 
     #[test]
     fn a_refusal_has_the_present_values() {
-        let of = ServiceInterface::of_catalogue(
-            Service::SetParams.type_name(),
-            Service::SetParams.fields(),
-            Service::SetParams.response_fields(),
-        );
+        let of = ServiceInterface::of_catalogue(Service::SetParams);
         let told = response(&of, json!({"gravity": 9.81}), false, "masses: too few");
         assert_eq!(
             told,

@@ -14,6 +14,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import numpy
 from peers_actions import test_a_goal_is_sent_as_an_action, test_a_path_is_sent_as_an_action
 from peers_stage import (
     BRIDGE,
@@ -23,12 +24,12 @@ from peers_stage import (
     Peer,
     command_line,
     free_port,
-    open_session,
+    hears_joint_states,
     start_arm,
     start_bridge,
     tokens,
 )
-from programs import LIMIT, run, say, start_router, wait_for
+from programs import LIMIT, open_session, run, say, start_router, wait_for
 from zenoh_ros2_sdk.attachment import Attachment
 
 
@@ -137,17 +138,12 @@ def test_a_trajectory_moves_the_arm(peer, states):
     time_type, duration_type = of["builtin_interfaces/msg/Time"], of["builtin_interfaces/msg/Duration"]
     goal = [0.5, -0.25]
     header = of["std_msgs/msg/Header"](stamp=time_type(sec=0, nanosec=0), frame_id="")
-
-    def numbers(*values):
-        import numpy
-
-        return numpy.array(values, dtype=numpy.float64)
-
+    nothing = numpy.array([], dtype=numpy.float64)
     point = of["trajectory_msgs/msg/JointTrajectoryPoint"](
-        positions=numbers(*goal),
-        velocities=numbers(),
-        accelerations=numbers(),
-        effort=numbers(),
+        positions=numpy.array(goal),
+        velocities=nothing,
+        accelerations=nothing,
+        effort=nothing,
         time_from_start=duration_type(sec=0, nanosec=0),
     )
 
@@ -183,8 +179,6 @@ def test_services_answer_and_say_what_is_wrong(peer):
         "float64 gravity\nfloat64[] masses\nfloat64[] lengths",
         f"float64 gravity\nfloat64[] masses\nfloat64[] lengths\n{outcome}",
     )
-    import numpy
-
     nothing = numpy.array([], dtype=numpy.float64)
     response = params.call(gravity=0.0, masses=nothing, lengths=nothing)
     assert response.success and response.gravity == 9.81 and len(response.masses) == 2, response
@@ -234,12 +228,9 @@ def test_the_router_comes_back(port, bridge, router, states):
     bridge.said("lost the router at")
     router = start_router(f"tcp/127.0.0.1:{port}")
     bridge.said("connected to the router at", times=2)
-    session = open_session(port)
+    session = open_session(f"tcp/127.0.0.1:{port}")
     wait_for("the node", lambda: [token for token in tokens(session, "NN") if token[8] == "arm_sim"])
-    received = []
-    watcher = session.declare_subscriber(f"{DOMAIN}/joint_states/**", received.append)
-    wait_for("joint states", lambda: len(received) >= 10)
-    watcher.undeclare()
+    hears_joint_states(session)
     return router, session
 
 
@@ -248,20 +239,14 @@ def test_the_arm_comes_back(port, bridge, arm, session):
     wait_for("an empty graph", lambda: not [token for token in tokens(session) if token[8] == "arm_sim"])
     arm, address = start_arm(port)
     bridge.said("is in domain", times=2)
-    received = []
-    watcher = session.declare_subscriber(f"{DOMAIN}/joint_states/**", received.append)
-    wait_for("joint states", lambda: len(received) >= 10)
-    watcher.undeclare()
+    hears_joint_states(session)
     return arm, address
 
 
 def test_another_arm_has_its_namespace(address, port, session):
     left = start_bridge(address, port, "--namespace", "/left")
     left.said("is in domain")
-    received = []
-    watcher = session.declare_subscriber(f"{DOMAIN}/left/joint_states/**", received.append)
-    wait_for("joint states", lambda: len(received) >= 10)
-    watcher.undeclare()
+    hears_joint_states(session, "/left")
     found = {(token[7], token[9]) for token in tokens(session, "MP")}
     assert {("%", "%joint_states"), ("%left", "%left%joint_states")} <= found, found
     left.end()
@@ -306,7 +291,7 @@ def main():
     router = start_router(f"tcp/127.0.0.1:{port}")
     arm, address = start_arm(arm_port)
     say(bridge.said("is in domain"))
-    session = open_session(port)
+    session = open_session(f"tcp/127.0.0.1:{port}")
     peer = Peer(port)
     say(test_topics_are_listed_with_their_types(port))
     say(test_hashes_are_those_that_ros_2_itself_has(session))

@@ -1,12 +1,19 @@
 """Actions of the bridge, for peers.py. The SDK has no action client, so each action is used through its services and
 topics."""
 
+import numpy
+from control_msgs import CONTROL_MSGS
 from peers_stage import JAZZY, LATCHED, tokens
 from programs import wait_for
 from zenoh_ros2_sdk import ROS2Subscriber
 
 UUID = "unique_identifier_msgs/msg/UUID"
 TIME = "builtin_interfaces/msg/Time"
+GOAL_ID = "unique_identifier_msgs/UUID goal_id"
+INSIDE = {
+    "unique_identifier_msgs__UUID": "uint8[16] uuid",
+    "builtin_interfaces__Time": "int32 sec\nuint32 nanosec",
+}
 
 
 def definition(fields, **inside):
@@ -15,69 +22,50 @@ def definition(fields, **inside):
     return "\n".join([fields, *parts])
 
 
-def test_a_goal_is_sent_as_an_action(peer, session):
-    """The services and subscriptions of one action, with the hashes in the graph."""
-    import numpy
+class ActionClient:
+    """The services and the feedback of an action, with the hashes in the graph. `parts` are the types of its goal, its
+    result and its feedback, and `inside` has the definitions of all its types."""
 
-    place = "/ik_action/_action/"
-    hashes = {token[9]: (token[10], token[11]) for kind in ["SS", "MP"] for token in tokens(session, kind)}
+    def __init__(self, peer, session, place, action, parts, inside):
+        self.peer, self.place, self.inside = peer, f"{place}/_action/", {**INSIDE, **inside}
+        self.hashes = {token[9]: (token[10], token[11]) for kind in ["SS", "MP"] for token in tokens(session, kind)}
+        goal, result, feedback = parts
+        accepted = "bool accepted\nbuiltin_interfaces/Time stamp"
+        self.send = self.service("send_goal", f"{action}_SendGoal", f"{GOAL_ID}\n{goal} goal", accepted)
+        self.wait = self.service("get_result", f"{action}_GetResult", GOAL_ID, f"int8 status\n{result} result")
+        self.received = []
+        kind, text = f"{action}_FeedbackMessage", definition(f"{GOAL_ID}\n{feedback} feedback", **self.inside)
+        options = {"msg_definition": text, "type_hash": self.hash_of("feedback", kind), **peer.at}
+        ROS2Subscriber(f"{self.place}feedback", kind, self.received.append, **options)
 
-    def found(part, kind):
-        dds, found = hashes[f"%ik_action%_action%{part}"]
+    def hash_of(self, part, kind):
+        dds, found = self.hashes[f"{self.place}{part}".replace("/", "%")]
         package, middle, name = kind.split("/")
         assert dds == f"{package}::{middle}::dds_::{name}_", dds
         return found
 
-    def service(part, kind, request, response):
-        return peer.service(f"{place}{part}", kind, request, response, found(part, kind))
+    def service(self, part, kind, request, response):
+        texts = [definition(text, **self.inside) for text in (request, response)]
+        return self.peer.service(f"{self.place}{part}", kind, *texts, self.hash_of(part, kind))
 
-    uuid, stamp = {"unique_identifier_msgs__UUID": "uint8[16] uuid"}, {"builtin_interfaces__Time": "int32 sec\nuint32 nanosec"}
-    target = {"pendularm_interfaces__Target": "float64 x\nfloat64 y\nfloat64 phi"}
-    move = "pendularm_interfaces/action/MoveTo"
-    send = service(
-        "send_goal",
-        f"{move}_SendGoal",
-        definition(
-            "unique_identifier_msgs/UUID goal_id\npendularm_interfaces/MoveToGoal goal",
-            pendularm_interfaces__MoveToGoal="float64 x\nfloat64 y\nfloat64 phi\nfloat64 epsilon\nfloat64 success_hold",
-            **uuid,
-        ),
-        definition("bool accepted\nbuiltin_interfaces/Time stamp", **stamp),
-    )
-    wait = service(
-        "get_result",
-        f"{move}_GetResult",
-        definition("unique_identifier_msgs/UUID goal_id", **uuid),
-        definition(
-            "int8 status\npendularm_interfaces/MoveToResult result",
-            pendularm_interfaces__MoveToResult="string goal_id\nstring outcome\npendularm_interfaces/Target target\n"
-            "float64 final_distance",
-            **target,
-        ),
-    )
-    info = {"action_msgs__GoalInfo": "unique_identifier_msgs/UUID goal_id\nbuiltin_interfaces/Time stamp", **uuid, **stamp}
-    cancel = service(
-        "cancel_goal",
-        "action_msgs/srv/CancelGoal",
-        definition("action_msgs/GoalInfo goal_info", **info),
-        definition("int8 return_code\naction_msgs/GoalInfo[] goals_canceling", **info),
-    )
-    received = []
-    ROS2Subscriber(
-        f"{place}feedback",
-        f"{move}_FeedbackMessage",
-        received.append,
-        msg_definition=definition(
-            "unique_identifier_msgs/UUID goal_id\npendularm_interfaces/MoveToFeedback feedback",
-            pendularm_interfaces__MoveToFeedback="string goal_id\npendularm_interfaces/Target target\nfloat64[] positions\n"
-            "float64 distance_remaining\nfloat64 elapsed",
-            **uuid,
-            **target,
-        ),
-        type_hash=found("feedback", f"{move}_FeedbackMessage"),
-        **peer.at,
-    )
-    states = peer.subscribe(f"{place}status", "action_msgs/msg/GoalStatusArray", qos=LATCHED)
+
+def test_a_goal_is_sent_as_an_action(peer, session):
+    """The services and subscriptions of one action."""
+    package = "pendularm_interfaces"
+    inside = {
+        f"{package}__MoveToGoal": "float64 x\nfloat64 y\nfloat64 phi\nfloat64 epsilon\nfloat64 success_hold",
+        f"{package}__MoveToResult": f"string goal_id\nstring outcome\n{package}/Target target\nfloat64 final_distance",
+        f"{package}__MoveToFeedback": f"string goal_id\n{package}/Target target\nfloat64[] positions\n"
+        "float64 distance_remaining\nfloat64 elapsed",
+        f"{package}__Target": "float64 x\nfloat64 y\nfloat64 phi",
+        "action_msgs__GoalInfo": f"{GOAL_ID}\nbuiltin_interfaces/Time stamp",
+    }
+    parts = [f"{package}/MoveTo{part}" for part in ["Goal", "Result", "Feedback"]]
+    client = ActionClient(peer, session, "/ik_action", f"{package}/action/MoveTo", parts, inside)
+    send, wait, received = client.send, client.wait, client.received
+    outcome = "int8 return_code\naction_msgs/GoalInfo[] goals_canceling"
+    cancel = client.service("cancel_goal", "action_msgs/srv/CancelGoal", "action_msgs/GoalInfo goal_info", outcome)
+    states = peer.subscribe(f"{client.place}status", "action_msgs/msg/GoalStatusArray", qos=LATCHED)
     of = send.session_mgr.store.types
 
     def goal(number, x, y, success_hold=0.0):
@@ -111,27 +99,13 @@ def test_a_goal_is_sent_as_an_action(peer, session):
 
 def test_a_path_is_sent_as_an_action(peer, session, states):
     """Uses ROS 2's definition. Fields for other robots are empty."""
-    import numpy
-
-    name = "control_msgs/action/FollowJointTrajectory"
-    place = "/joint_trajectory_controller/follow_joint_trajectory/_action/"
-    hashes = {token[9]: token[11] for token in tokens(session, "SS")}
-
-    def own(kind):
-        return JAZZY.generate_msgdef(kind, ros_version=2)[0].split("=" * 80)[0].strip()
-
+    goal, result, feedback = CONTROL_MSGS["action/FollowJointTrajectory.action"].split("---\n")
     inside = {
-        "unique_identifier_msgs__UUID": "uint8[16] uuid",
-        "control_msgs__FollowGoal": "trajectory_msgs/JointTrajectory trajectory\n"
-        "trajectory_msgs/MultiDOFJointTrajectory multi_dof_trajectory\n"
-        "control_msgs/JointTolerance[] path_tolerance\n"
-        "control_msgs/JointComponentTolerance[] component_path_tolerance\n"
-        "control_msgs/JointTolerance[] goal_tolerance\n"
-        "control_msgs/JointComponentTolerance[] component_goal_tolerance\n"
-        "builtin_interfaces/Duration goal_time_tolerance",
-        "control_msgs__JointTolerance": "string name\nfloat64 position\nfloat64 velocity\nfloat64 acceleration",
-        "control_msgs__JointComponentTolerance": "string joint_name\nuint16 component\nfloat64 position\n"
-        "float64 velocity\nfloat64 acceleration",
+        "control_msgs__FollowGoal": goal,
+        "control_msgs__FollowResult": result,
+        "control_msgs__FollowFeedback": feedback,
+        "control_msgs__JointTolerance": CONTROL_MSGS["msg/JointTolerance.msg"],
+        "control_msgs__JointComponentTolerance": CONTROL_MSGS["msg/JointComponentTolerance.msg"],
     }
     for kind in [
         "trajectory_msgs/msg/JointTrajectory",
@@ -143,46 +117,14 @@ def test_a_path_is_sent_as_an_action(peer, session, states):
         "geometry_msgs/msg/Vector3",
         "geometry_msgs/msg/Quaternion",
         "std_msgs/msg/Header",
-        TIME,
         "builtin_interfaces/msg/Duration",
     ]:
-        inside[kind.replace("/msg/", "__")] = own(kind)
-
-    received = []
-    feedback = definition(
-        "unique_identifier_msgs/UUID goal_id\ncontrol_msgs/FollowFeedback feedback",
-        control_msgs__FollowFeedback="std_msgs/Header header\nstring[] joint_names\n"
-        "trajectory_msgs/JointTrajectoryPoint desired\ntrajectory_msgs/JointTrajectoryPoint actual\n"
-        "trajectory_msgs/JointTrajectoryPoint error\nstring[] multi_dof_joint_names\n"
-        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_desired\n"
-        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_actual\n"
-        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_error",
-        **inside,
-    )
-    hashed = next(token[11] for token in tokens(session, "MP") if token[9] == f"{place}feedback".replace("/", "%"))
-    options = {"msg_definition": feedback, "type_hash": hashed, **peer.at}
-    ROS2Subscriber(f"{place}feedback", f"{name}_FeedbackMessage", received.append, **options)
-
-    def service(part, kind, request, response):
-        hashed = hashes[f"{place}{part}".replace("/", "%")]
-        return peer.service(f"{place}{part}", f"{name}_{kind}", request, response, hashed)
-
-    uuid, stamp = {"unique_identifier_msgs__UUID": "uint8[16] uuid"}, {"builtin_interfaces__Time": own(TIME)}
-    send = service(
-        "send_goal",
-        "SendGoal",
-        definition("unique_identifier_msgs/UUID goal_id\ncontrol_msgs/FollowGoal goal", **inside),
-        definition("bool accepted\nbuiltin_interfaces/Time stamp", **stamp),
-    )
-    wait = service(
-        "get_result",
-        "GetResult",
-        definition("unique_identifier_msgs/UUID goal_id", **uuid),
-        definition(
-            "int8 status\ncontrol_msgs/FollowResult result",
-            control_msgs__FollowResult="int32 error_code\nstring error_string",
-        ),
-    )
+        definitions, _ = JAZZY.generate_msgdef(kind, ros_version=2)
+        inside[kind.replace("/msg/", "__")] = definitions.split("=" * 80)[0].strip()
+    parts = [f"control_msgs/Follow{part}" for part in ["Goal", "Result", "Feedback"]]
+    place, action = "/joint_trajectory_controller/follow_joint_trajectory", "control_msgs/action/FollowJointTrajectory"
+    client = ActionClient(peer, session, place, action, parts, inside)
+    send, wait, received = client.send, client.wait, client.received
     of = send.session_mgr.store.types
     duration = of["builtin_interfaces/msg/Duration"]
     header = of["std_msgs/msg/Header"](stamp=of[TIME](sec=0, nanosec=0), frame_id="")

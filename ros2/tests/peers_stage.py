@@ -5,8 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import zenoh
-from programs import LIMIT, Process
+from programs import LIMIT, Process, wait_for
 from rosbags.typesys import Stores, get_typestore
 from zenoh_ros2_sdk import ROS2Publisher, ROS2ServiceClient, ROS2Subscriber
 from zenoh_ros2_sdk.qos import QosDurability, QosProfile
@@ -37,18 +36,18 @@ def start_bridge(arm, router_port, *more):
     return Process(BRIDGE, "--connect", arm, "--router", router, "--domain", DOMAIN, *more)
 
 
-def open_session(port):
-    config = zenoh.Config()
-    config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", f'["tcp/127.0.0.1:{port}"]')
-    config.insert_json5("scouting/multicast/enabled", "false")
-    return zenoh.open(config)
-
-
 def tokens(session, kind="*"):
     """The parts of the tokens of that kind in the domain: 8 is the node, 9 the name, 10 the type, 11 the hash."""
     replies = session.liveliness().get(f"@ros2_lv/{DOMAIN}/*/*/*/{kind}/**")
     return [str(reply.ok.key_expr).split("/") for reply in replies if reply.ok]
+
+
+def hears_joint_states(session, namespace=""):
+    """Waits for ten joint states of the arm in this namespace."""
+    received = []
+    watcher = session.declare_subscriber(f"{DOMAIN}{namespace}/joint_states/**", received.append)
+    wait_for("joint states", lambda: len(received) >= 10)
+    watcher.undeclare()
 
 
 def command_line(port, *arguments):

@@ -1,6 +1,7 @@
 """Programs that tests start, their output, and waiting for it. Every wait ends with its condition, or fails after a
 minute."""
 
+import json
 import os
 import signal
 import subprocess
@@ -67,6 +68,17 @@ def start_router(listen, *connect, before=()):
     router = Process(*before, sys.executable, program, *listen, *options, stream="stdout")
     router.said("ready")
     return router
+
+
+def open_session(endpoint):
+    """A Zenoh session that connects only to this endpoint."""
+    import zenoh
+
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    return zenoh.open(config)
 
 
 def run(main):

@@ -11,6 +11,8 @@ import sys
 import threading
 import time
 
+from programs import open_session
+
 # 60 a second for some minutes.
 MOST_ROWS = 20_000
 
@@ -49,10 +51,6 @@ class Watcher:
 def watch_graph(router, key, count):
     import zenoh
 
-    config = zenoh.Config()
-    config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([router]))
-    config.insert_json5("scouting/multicast/enabled", "false")
     watchers, kept = [], []
     for index in range(int(count)):
         watcher = Watcher(keeps_rows=index == 0)
@@ -63,7 +61,7 @@ def watch_graph(router, key, count):
             seconds, nanoseconds = struct.unpack_from("<iI", sample.payload.to_bytes(), 4)
             watcher.hear(number, seconds * 10**9 + nanoseconds, sent)
 
-        session = zenoh.open(config)
+        session = open_session(router)
         kept += [session, session.declare_subscriber(key, zenoh.handlers.Callback(hear, indirect=False))]
         watchers.append(watcher)
     return watchers, kept

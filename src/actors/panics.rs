@@ -9,10 +9,6 @@
 use std::cell::{Cell, RefCell};
 use std::fmt::Write as _;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook};
-use std::pin::Pin;
-use std::task::{Context, Poll};
-
-use actix::{Actor, ActorFuture};
 
 /// Longest part of a panic's message that is reported.
 const MAX_WORDS: usize = 200;
@@ -53,30 +49,6 @@ pub fn contain<T>(work: impl FnOnce() -> T) -> Result<T, Contained> {
         outcome
     });
     outcome.map_err(|_| Contained(LAST.with_borrow_mut(std::mem::take)))
-}
-
-/// The same for a task of an actor: each poll is contained. It returns the task's result, or the panic.
-pub fn contained<A: Actor, F: ActorFuture<A>>(task: F) -> ContainedTask<F> {
-    ContainedTask(Box::pin(task))
-}
-
-/// A task of an actor that ends with its first panic.
-pub struct ContainedTask<F>(Pin<Box<F>>);
-
-impl<A: Actor, F: ActorFuture<A>> ActorFuture<A> for ContainedTask<F> {
-    type Output = Result<F::Output, Contained>;
-
-    fn poll(
-        mut self: Pin<&mut Self>,
-        actor: &mut A,
-        ctx: &mut A::Context,
-        cx: &mut Context<'_>,
-    ) -> Poll<Self::Output> {
-        match contain(|| self.0.as_mut().poll(actor, ctx, cx)) {
-            Ok(polled) => polled.map(Ok),
-            Err(panic) => Poll::Ready(Err(panic)),
-        }
-    }
 }
 
 /// One line: the place and the panic's message, escaped and shortened.

@@ -187,6 +187,9 @@ class Tasks(CourseTest):
         self.page.key("Enter")
 
     def test_a_keyboard_does_a_step_and_keeps_its_place(self):
+        span = self.page.run("document.querySelector('#plot-span').selectedIndex")
+        self.page.key("-")
+        self.assertEqual(self.page.run("document.querySelector('#plot-span').selectedIndex"), span, "hidden plots stay")
         self.press("#course-start")
         self.page.until("!document.querySelector('#course-dial').inert && own('arm_view.js').then(({ endEffector }) => endEffector().x > 1.99)", why="the scene")
         self.page.run("document.querySelector('#arm').focus()")

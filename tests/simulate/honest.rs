@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::rc::Rc;
 use std::time::Duration;
 
+use pendularm_client::codec::Framing;
 use tokio::time::Instant;
 
-use crate::client::{Client, Door};
+use crate::client::Client;
 use crate::court::Court;
 use crate::pipe::Fate;
 
@@ -88,7 +89,6 @@ pub struct Honest {
     /// A number that no other client of the seed has.
     pub who: u64,
     pub client: Client,
-    pub door: Door,
     pub fate: Rc<Cell<Fate>>,
     pub calls: BTreeMap<String, Call>,
     /// By the spelling of the topic.
@@ -125,11 +125,9 @@ pub struct Honest {
 
 impl Honest {
     pub fn new(who: u64, client: Client, fate: Rc<Cell<Fate>>) -> Self {
-        let door = client.door();
         let mut honest = Self {
             who,
             client,
-            door,
             fate,
             calls: BTreeMap::new(),
             subscriptions: BTreeMap::new(),
@@ -157,7 +155,7 @@ impl Honest {
     pub fn send(&mut self, frame: &str, style: u8) {
         self.frames += 1;
         // Without a line end, every later frame would wait for the next one.
-        let style = if self.door == Door::Plain && style % 4 == 2 {
+        let style = if self.client.framing() == Framing::Lines && style % 4 == 2 {
             0
         } else {
             style

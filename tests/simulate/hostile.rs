@@ -5,12 +5,13 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
-use crate::client::{Client, Door};
+use crate::client::Client;
 use crate::court::Court;
 use crate::honest::Honest;
 use crate::pipe::Fate;
 use crate::plan::Hostility;
 use crate::workload::frame;
+use pendularm_client::codec::Framing;
 use pendularm_client::websocket::{append, opcode};
 
 /// A decimal that is slow to read exactly: 20 digits near the middle between two doubles.
@@ -208,7 +209,7 @@ impl Hostile {
     }
 
     fn flood_pings(&self, court: &Court) {
-        if self.client.door() == Door::Socket {
+        if self.client.framing() == Framing::WebSocket {
             self.client.pause(court.chance(0.7));
             let mut bytes = Vec::new();
             for _ in 0..court.below(2000) {

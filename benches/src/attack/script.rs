@@ -60,7 +60,7 @@ pub struct Client {
     /// Sent once.
     pub(super) first: Arc<Vec<u8>>,
     /// Sent after that, over and over.
-    pub(super) again: Arc<[u8]>,
+    pub(super) again: Arc<Vec<u8>>,
     /// At most this many bytes per interval. Without it, as many as the server accepts.
     pub(super) drip: Option<(usize, Duration)>,
     /// When it connects, from the beginning of the attack.
@@ -78,7 +78,7 @@ impl Client {
             door,
             ear: Ear::Reads,
             first: Arc::default(),
-            again: Arc::from([]),
+            again: Arc::default(),
             drip: None,
             after: Duration::ZERO,
             exit: (Exit::Stays, Duration::ZERO),
@@ -109,10 +109,7 @@ impl Client {
 
     /// Sends a frame once for each number.
     pub fn says_each(self, numbers: Range<usize>, frame: impl Fn(usize) -> String) -> Self {
-        let bytes: Vec<u8> = numbers
-            .flat_map(|number| self.framed(&frame(number)))
-            .collect();
-        self.says_bytes(&bytes)
+        numbers.fold(self, |client, number| client.says(&frame(number)))
     }
 
     /// Sends bytes once, unchanged.
@@ -134,15 +131,12 @@ impl Client {
 
     /// Sends a frame for each number, and begins again.
     pub fn repeats_each(self, numbers: Range<usize>, frame: impl Fn(usize) -> String) -> Self {
-        let bytes: Vec<u8> = numbers
-            .flat_map(|number| self.framed(&frame(number)))
-            .collect();
-        self.repeats_bytes(&bytes)
+        numbers.fold(self, |client, number| client.repeats(&frame(number)))
     }
 
     /// Sends bytes repeatedly.
     pub fn repeats_bytes(mut self, bytes: &[u8]) -> Self {
-        self.again = [&self.again, bytes].concat().into();
+        Arc::make_mut(&mut self.again).extend(bytes);
         self
     }
 

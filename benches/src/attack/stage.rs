@@ -53,7 +53,8 @@ struct Player<'a> {
     unread: Vec<u8>,
     writable: bool,
     readable: bool,
-    in_turn: bool,
+    /// It can send or read at once.
+    is_busy: bool,
     thirsty: bool,
     next_drip: Instant,
     next_sip: Instant,
@@ -71,14 +72,13 @@ pub fn play(cast: &[Client], address: SocketAddr, deeds: &Deeds, over: impl Fn()
         .iter()
         .map(|client| Player::new(client, address, began))
         .collect();
-    let mut turns = VecDeque::new();
     let mut chunk = vec![0; TURN];
     let mut swept = began - SWEEP;
     while !over() {
-        let wait = if turns.is_empty() {
-            SWEEP
-        } else {
+        let wait = if players.iter().any(|player| player.is_busy) {
             Duration::ZERO
+        } else {
+            SWEEP
         };
         if poll
             .poll(&mut events, Some(wait))
@@ -88,43 +88,32 @@ pub fn play(cast: &[Client], address: SocketAddr, deeds: &Deeds, over: impl Fn()
         }
         for event in &events {
             let Token(number) = event.token();
-            players[number].writable |= event.is_writable();
-            players[number].readable |= event.is_readable();
+            let player = &mut players[number];
+            player.writable |= event.is_writable();
+            player.readable |= event.is_readable();
+            player.is_busy = true;
             if event.is_error() || event.is_read_closed() && event.is_write_closed() {
-                players[number].end(Instant::now());
+                player.end(Instant::now());
             }
-            take_turn(&mut players, &mut turns, number);
         }
         let now = Instant::now();
         if now >= swept + SWEEP {
             swept = now;
             let mut connects = CONNECTS;
-            for number in 0..players.len() {
-                if players[number].connects(now) {
+            for (number, player) in players.iter_mut().enumerate() {
+                if player.connects(now) {
                     if connects > 0 {
                         connects -= 1;
-                        players[number].connect(number, address, &poll, deeds);
+                        player.connect(number, address, &poll, deeds);
                     }
-                } else if players[number].sweep(now) {
-                    take_turn(&mut players, &mut turns, number);
+                } else {
+                    player.is_busy |= player.sweep(now);
                 }
             }
         }
-        for _ in 0..turns.len() {
-            let Some(number) = turns.pop_front() else {
-                break;
-            };
-            players[number].in_turn = false;
-            if players[number].turn(&mut chunk, deeds) {
-                take_turn(&mut players, &mut turns, number);
-            }
+        for player in players.iter_mut().filter(|player| player.is_busy) {
+            player.is_busy = player.turn(&mut chunk, deeds);
         }
-    }
-}
-
-fn take_turn(players: &mut [Player], turns: &mut VecDeque<usize>, number: usize) {
-    if !std::mem::replace(&mut players[number].in_turn, true) {
-        turns.push_back(number);
     }
 }
 
@@ -146,7 +135,7 @@ impl<'a> Player<'a> {
             unread: Vec::new(),
             writable: false,
             readable: false,
-            in_turn: false,
+            is_busy: false,
             thirsty: false,
             next_drip: began,
             next_sip: began,

@@ -8,16 +8,14 @@
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use pendularm_benches::program::{Program, processor, resident};
+use pendularm_benches::program::{self, Program, processor, resident};
 use pendularm_client::blocking::Client;
 
 /// Simulation time on `/clock` \[s\], and the time of its arrival.
 fn simulation_time(address: SocketAddr) -> (f64, Instant) {
     let mut client = Client::to(address);
     client.subscribe("/clock");
-    let clock = &client.message("/clock")["clock"];
-    let number = |key: &str| clock[key].as_f64().expect("a number");
-    (number("sec") + 1e-9 * number("nanosec"), Instant::now())
+    (program::simulation_time(&mut client), Instant::now())
 }
 
 /// Wakes up 60 times a second for that time, and returns the part of a core that it takes.

@@ -58,10 +58,7 @@ async fn echo() {
         tokio::spawn(async move {
             let mut buffer = vec![0; 4096];
             while let Ok(read @ 1..) = stream.read(&mut buffer).await {
-                let Some(bytes) = buffer.get(..read) else {
-                    break;
-                };
-                if stream.write_all(bytes).await.is_err() {
+                if stream.write_all(&buffer[..read]).await.is_err() {
                     break;
                 }
             }

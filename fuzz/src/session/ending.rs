@@ -68,16 +68,8 @@ impl Session {
         self.pass(Duration::from_millis(5)).await;
         for &client in &left {
             for _ in 0..LAST_MESSAGES {
-                self.messages += 1;
-                let number = self.messages;
-                let more = VALUES[number as usize % VALUES.len()];
-                let from = u64::from(client);
-                self.book
-                    .borrow_mut()
-                    .publish(number, from, LAST_TOPIC, more);
-                let frame = format!(
-                    "{{\"op\":\"publish\",\"topic\":{topic},\"msg\":{{\"from\":{from},\"number\":{number},\"more\":{more}}}}}"
-                );
+                let more = VALUES[(self.messages as usize + 1) % VALUES.len()];
+                let frame = self.message(client, LAST_TOPIC, more);
                 self.player(client).client.send(&frame, 0);
             }
             for &provider in &left {
@@ -126,7 +118,7 @@ impl Session {
 
     /// Time before the next check.
     pub(super) fn patience(&self, milliseconds: u64, waited: Duration) -> Duration {
-        let soon = waited.is_zero() || self.cast == Cast::Arm;
+        let soon = waited.is_zero() || self.has_arm;
         Duration::from_millis(if soon { 10 } else { milliseconds })
     }
 

@@ -21,7 +21,7 @@ impl Session {
 
     /// Any bytes, up to the end of a line or message. Later input is read normally.
     pub(super) fn send_garbage(&mut self, client: u8, bytes: &[u8]) {
-        let door = self.door;
+        let framing = self.framing;
         let player = self.player(client);
         let text = String::from_utf8_lossy(bytes);
         // It may change statuses, fragments or calls in ways that the model does not predict.
@@ -30,9 +30,9 @@ impl Session {
             .any(|word| text.contains(word));
         player.is_excused |= meddles;
         player.note_forgery(bytes);
-        match door {
-            Door::Plain => player.client.send_bytes([bytes, b"\n"].concat()),
-            Door::Socket => {
+        match framing {
+            Framing::Lines => player.client.send_bytes([bytes, b"\n"].concat()),
+            Framing::WebSocket => {
                 let mut message = Vec::new();
                 let kind = websocket::opcode::BINARY;
                 websocket::append_message(&mut message, kind, [1, 2, 3, 4], 0, bytes);
@@ -43,7 +43,6 @@ impl Session {
 
     /// The text of a frame, recorded if it requires an answer.
     pub(super) fn frame(&mut self, client: u8, deed: &Deed<'_>) -> Option<String> {
-        let place = u64::from(client) % CLIENTS as u64;
         Some(match deed {
             Deed::Advertise { topic } => {
                 format!("{{\"op\":\"advertise\",\"topic\":{}}}", topic_of(*topic))
@@ -52,15 +51,8 @@ impl Session {
                 format!("{{\"op\":\"unadvertise\",\"topic\":{}}}", topic_of(*topic))
             }
             Deed::Publish { topic, payload } => {
-                self.messages += 1;
-                let number = self.messages;
                 let more = payload.json().unwrap_or("0".to_owned());
-                let name = TOPICS[usize::from(*topic) % TOPICS.len()];
-                self.book.borrow_mut().publish(number, place, name, &more);
-                let topic = topic_of(*topic);
-                format!(
-                    "{{\"op\":\"publish\",\"topic\":{topic},\"msg\":{{\"from\":{place},\"number\":{number},\"more\":{more}}}}}"
-                )
+                self.message(client, TOPICS[usize::from(*topic) % TOPICS.len()], &more)
             }
             Deed::Subscribe {
                 topic,
@@ -128,6 +120,18 @@ impl Session {
         })
     }
 
+    /// A message of a client, recorded.
+    pub(super) fn message(&mut self, client: u8, topic: &str, more: &str) -> String {
+        self.messages += 1;
+        let number = self.messages;
+        let from = u64::from(client) % CLIENTS as u64;
+        self.book.borrow_mut().publish(number, from, topic, more);
+        let topic = quoted(topic);
+        format!(
+            "{{\"op\":\"publish\",\"topic\":{topic},\"msg\":{{\"from\":{from},\"number\":{number},\"more\":{more}}}}}"
+        )
+    }
+
     pub(super) fn call(
         &mut self,
         client: u8,
@@ -142,9 +146,10 @@ impl Session {
             "{{\"op\":\"call_service\",\"service\":{},\"id\":\"{id}\"",
             service_of(service)
         );
-        let timeout = match self.cast {
-            Cast::Stub => timeout,
-            Cast::Arm => Some(timeout.unwrap_or_default() % ARM_WAIT),
+        let timeout = if self.has_arm {
+            Some(timeout.unwrap_or_default() % ARM_WAIT)
+        } else {
+            timeout
         };
         // 0 would mean none, and a call of a silent provider would wait for a day.
         let seconds = timeout.map(|ms| f64::from(ms.max(1)) / 1000.0);

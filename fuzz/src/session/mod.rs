@@ -30,14 +30,15 @@ use pendularm::actors::gateway::limits::{LINGER, RESPONSES_TIME, STALL_LIMIT};
 use pendularm::actors::resources::memory::Memory;
 use pendularm::protocol::catalog::{Rosapi, Service, Topic};
 use pendularm::web::stream::ANSWER_TIME;
+use pendularm_client::codec::{Event, Framing};
 use pendularm_client::websocket;
 use tokio::time::sleep;
 
 use crate::book::Book;
 use crate::cbor;
-use crate::client::{Client, Door, Received};
+use crate::client::Client;
 use crate::json::Json;
-use crate::stage::{Manner, Stage, run, run_apart, scarce};
+use crate::stage::{Manner, Stage, run, run_apart};
 use text::{TOPICS, VALUES, fitting, put, quoted, service_name, service_of, topic_of};
 
 /// Most steps of one execution, and its number of clients.
@@ -55,45 +56,30 @@ const ID: &str = "call-";
 const LAST_MESSAGES: u64 = 3;
 const LAST_TOPIC: &str = "/in/the/end";
 
-/// Plays a script with clients of one kind, and one node that serves everything.
-pub fn play(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
-    run(async {
-        let stage = Stage::new(Admission::default(), memory(is_scarce)).await;
-        Session::new(door, Cast::Stub, is_scarce, stage)
-            .perform_all(steps)
-            .await;
-    });
-}
-
-/// Plays a script with the runtime's own nodes, in less virtual time, because an arm with tiny timesteps uses its
-/// whole budget.
-pub fn play_with_arm(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
-    run_apart(async {
-        let stage = Stage::with_arm(Admission::default(), memory(is_scarce)).await;
-        Session::new(door, Cast::Arm, is_scarce, stage)
-            .perform_all(steps)
-            .await;
-    });
-}
-
-fn memory(is_scarce: bool) -> Memory {
-    if is_scarce {
-        scarce()
+/// Plays a script with clients of one kind. One node serves everything. With `has_arm`, the runtime's own nodes serve,
+/// in less virtual time, because an arm with tiny timesteps uses its whole budget.
+pub fn play(framing: Framing, is_scarce: bool, has_arm: bool, steps: &[Step<'_>]) {
+    let memory = if is_scarce {
+        // A few clients can fill it in one execution.
+        Memory::of(1, 1 << 20)
     } else {
         Memory::default()
+    };
+    let session = async {
+        let stage = Stage::new(Admission::default(), memory, has_arm).await;
+        let session = Session::new(framing, has_arm, is_scarce, stage);
+        session.perform_all(steps).await;
+    };
+    if has_arm {
+        run_apart(session);
+    } else {
+        run(session);
     }
 }
 
-/// The server.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Cast {
-    Stub,
-    Arm,
-}
-
 struct Session {
-    door: Door,
-    cast: Cast,
+    framing: Framing,
+    has_arm: bool,
     stage: Stage,
     players: Vec<Player>,
     /// Milliseconds left of [`ARM_TIME`].
@@ -128,10 +114,10 @@ struct Player {
 }
 
 impl Session {
-    fn new(door: Door, cast: Cast, is_scarce: bool, stage: Stage) -> Self {
+    fn new(framing: Framing, has_arm: bool, is_scarce: bool, stage: Stage) -> Self {
         let mut session = Self {
-            door,
-            cast,
+            framing,
+            has_arm,
             stage,
             players: Vec::new(),
             left: ARM_TIME,
@@ -154,10 +140,21 @@ impl Session {
         } else {
             usize::from(piece)
         };
-        let client = Client::new(self.door, self.stage.connect(room), piece);
+        let client = Client::new(self.framing, self.stage.connect(room), piece);
         // So later bytes cannot begin like another protocol.
         client.send("{\"op\":\"set_level\",\"level\":\"info\"}", 0);
-        Player::new(client, Rc::clone(&self.book))
+        Player {
+            client,
+            answered: BTreeMap::new(),
+            forwarded: Vec::new(),
+            last: Vec::new(),
+            book: Rc::clone(&self.book),
+            latest: HashMap::new(),
+            pieces: HashMap::new(),
+            is_excused: false,
+            has_ended: false,
+            idle: Duration::ZERO,
+        }
     }
 
     async fn perform_all(mut self, steps: &[Step<'_>]) {
@@ -191,20 +188,21 @@ impl Session {
             }
             Step::Garbage { client, bytes } => self.send_garbage(*client, bytes),
             Step::Noise { client, bytes } => {
-                let door = self.door;
+                let framing = self.framing;
                 let player = self.player(*client);
                 // An unfinished line would contain the next frame, and a frame may be a close frame.
                 player.is_excused = true;
                 player.note_forgery(bytes);
                 player.client.send_bytes(bytes.to_vec());
-                if door == Door::Plain {
+                if framing == Framing::Lines {
                     player.client.send_bytes(b"\n".to_vec());
                 }
             }
             Step::Wait(milliseconds) => {
-                let milliseconds = match self.cast {
-                    Cast::Stub => *milliseconds,
-                    Cast::Arm => (milliseconds % ARM_WAIT).min(self.left),
+                let milliseconds = if self.has_arm {
+                    (milliseconds % ARM_WAIT).min(self.left)
+                } else {
+                    *milliseconds
                 };
                 self.left -= milliseconds.min(self.left);
                 self.pass(Duration::from_millis(milliseconds.into())).await;
@@ -276,8 +274,9 @@ impl Session {
         for player in &mut self.players {
             for received in player.client.take() {
                 match received {
-                    Received::Json(line) => player.hear(&line),
-                    Received::Binary(bytes) => player.hear_binary(&bytes),
+                    Event::Text(line) => player.hear(&line),
+                    Event::Binary(bytes) => player.hear_binary(&bytes),
+                    Event::Ping(_) | Event::Pong(_) | Event::Close(..) => {}
                 }
             }
             if player.client.has_ended() && !player.has_ended {

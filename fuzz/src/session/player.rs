@@ -3,23 +3,6 @@
 use super::*;
 
 impl Player {
-    pub(super) fn new(client: Client, book: Rc<RefCell<Book>>) -> Self {
-        Self {
-            client,
-            answered: BTreeMap::new(),
-            forwarded: Vec::new(),
-            last: Vec::new(),
-            book,
-            latest: HashMap::new(),
-            pieces: HashMap::new(),
-            is_excused: false,
-            has_ended: false,
-            idle: Duration::ZERO,
-        }
-    }
-}
-
-impl Player {
     pub(super) fn is_owed(&self) -> bool {
         !self.is_excused && !self.has_ended
     }

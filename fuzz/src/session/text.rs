@@ -54,18 +54,7 @@ impl Payload<'_> {
 
 /// A number as Python's `json` writes it.
 pub(super) fn python(number: f64) -> String {
-    if number.is_nan() {
-        "NaN".to_owned()
-    } else if number.is_infinite() {
-        if number > 0.0 {
-            "Infinity"
-        } else {
-            "-Infinity"
-        }
-        .to_owned()
-    } else {
-        format!("{number:e}")
-    }
+    format!("{number:e}").replace("inf", "Infinity")
 }
 
 /// A text as JSON.

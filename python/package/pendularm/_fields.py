@@ -2,12 +2,14 @@
 
 import operator
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ._native import as_doubles, is_masked, is_too_long
 
 __all__ = [
     "Floats",
@@ -23,9 +25,6 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
-
-MOST_LISTED = 10_000_000
-"""Most entries of a sequence that is not a NumPy array."""
 
 
 def shown(value: Any) -> str:
@@ -71,30 +70,6 @@ def flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
-def is_masked(value: Any, depth: int = 2) -> bool:
-    """Whether some of the numbers are masked. NumPy reads masked numbers also inside lists, down to this depth."""
-    if isinstance(value, np.ma.MaskedArray):
-        return bool(np.ma.is_masked(value))
-    parts: Iterable[Any] = ()
-    if isinstance(value, list | tuple):
-        parts = value
-    elif isinstance(value, np.ndarray) and value.dtype.hasobject:
-        parts = value.flat
-    return depth > 0 and any(is_masked(one, depth - 1) for one in parts)
-
-
-def is_too_long(value: Any, depth: int = 2) -> bool:
-    """Whether NumPy would allocate more than `MOST_LISTED` entries for it, for example for a range."""
-    if hasattr(value, "__array__") or not hasattr(value, "__len__"):
-        return False
-    try:
-        if len(value) > MOST_LISTED:
-            return True
-    except OverflowError:
-        return True
-    return depth > 0 and isinstance(value, list | tuple) and any(is_too_long(one, depth - 1) for one in value)
-
-
 def as_array(name: str, value: Any) -> NDArray[Any]:
     """The value as an array of any type."""
     try:
@@ -120,13 +95,7 @@ def numbers(value: Any) -> Floats:
     """The value as doubles. Texts, `None`, complex numbers and endless sequences are refused."""
     if is_too_long(value):
         raise ValueError
-    array = np.asarray(value)
-    if array.dtype.kind == "O":
-        # NumPy would read texts, convert None to NaN, and drop imaginary parts.
-        if any(one is None or isinstance(one, str | bytes | np.complexfloating) for one in array.flat):
-            raise TypeError
-        return array.astype(np.float64)
-    return array.astype(np.float64, casting="same_kind")
+    return as_doubles(value)
 
 
 def path(name: str, value: str | os.PathLike[str]) -> Path:

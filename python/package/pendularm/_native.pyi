@@ -11,6 +11,7 @@ __all__ = [
     "Batch",
     "Divergence",
     "Simulation",
+    "as_doubles",
     "coriolis",
     "default_gains",
     "end_effector",
@@ -18,6 +19,8 @@ __all__ = [
     "gravity_load",
     "inverse_dynamics",
     "inverse_kinematics",
+    "is_masked",
+    "is_too_long",
     "kinetic_energy",
     "mass_matrix",
     "plan",
@@ -168,6 +171,9 @@ class Batch:
     def end_effector(self) -> _Floats: ...
     def __len__(self) -> int: ...
 
+def as_doubles(value: Any) -> _Floats: ...
+def is_masked(value: Any) -> bool: ...
+def is_too_long(value: Any) -> bool: ...
 def default_gains(links: int = 2) -> dict[str, _Floats]: ...
 def mass_matrix(arm: Arm, q: ArrayLike) -> _Floats: ...
 def coriolis(arm: Arm, q: ArrayLike, qd: ArrayLike) -> _Floats: ...
@@ -180,46 +186,7 @@ def end_effector(arm: Arm, q: ArrayLike) -> _Floats: ...
 def inverse_kinematics(
     arm: Arm, x: float, y: float, phi: float | None = None, *, present: ArrayLike | None = None
 ) -> _Floats: ...
-def stability(
-    arm: Arm | None = None,
-    *,
-    integrator: str = "rk4",
-    gains: Mapping[str, ArrayLike] | None = None,
-    setpoint: ArrayLike | None = None,
-    q: ArrayLike | None = None,
-    qd: ArrayLike | None = None,
-    control_period: float = 0.0,
-) -> dict[str, Any]: ...
-def rollout(
-    arm: Arm | None = None,
-    *,
-    q0: ArrayLike | None = None,
-    qdot0: ArrayLike | None = None,
-    duration: float = 10.0,
-    timestep: float = 0.001,
-    integrator: str = "rk4",
-    gains: Mapping[str, ArrayLike] | None = None,
-    setpoint: ArrayLike | None = None,
-    samples: int = 1001,
-    reference: bool | np.bool_ = False,
-    control_period: float = 0.0,
-) -> dict[str, Any]: ...
-def suggest_gains(
-    arm: Arm | None = None,
-    *,
-    settling_time: float = 4.0,
-    margin: float = 1.25,
-    timestep: float = 0.001,
-    integrator: str = "rk4",
-) -> dict[str, Any]: ...
-def plan(
-    error: float,
-    arm: Arm | None = None,
-    *,
-    duration: float | None = None,
-    q0: ArrayLike | None = None,
-    qdot0: ArrayLike | None = None,
-    gains: Mapping[str, ArrayLike] | None = None,
-    setpoint: ArrayLike | None = None,
-    control_period: float = 0.0,
-) -> dict[str, Any]: ...
+def stability(arguments: dict[str, Any], /) -> dict[str, Any]: ...
+def rollout(arguments: dict[str, Any], /) -> dict[str, Any]: ...
+def suggest_gains(arguments: dict[str, Any], /) -> dict[str, Any]: ...
+def plan(arguments: dict[str, Any], /) -> dict[str, Any]: ...

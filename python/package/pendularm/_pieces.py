@@ -6,7 +6,7 @@ import secrets
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -38,7 +38,8 @@ def hand_out(
     each result on arrival."""
     left = iter(starts)
     under_way: dict[Future[Any], int] = {}
-    with _Bar(total, total - sum(min(piece, total - start) for start in starts), progress) as bar:
+    already = total - sum(min(piece, total - start) for start in starts)
+    with _progress_bar(total, already) if progress else nullcontext() as bar:
         try:
             while True:
                 while len(under_way) < IN_FLIGHT and (start := next(left, None)) is not None:
@@ -52,7 +53,8 @@ def hand_out(
                     done[start] = future.result()
                     if kept is not None:
                         kept.keep(start, done[start])
-                    bar.update(min(piece, total - start))
+                    if bar is not None:
+                        bar.update(min(piece, total - start))
         finally:
             for future in under_way:
                 future.cancel()
@@ -64,36 +66,24 @@ def _in_notebook() -> bool:
     return interactive is not None and hasattr(interactive.get_ipython(), "kernel")
 
 
-class _Bar:
-    """A progress bar, if tqdm is installed and the output is visible."""
+def _progress_bar(total: int, already: int) -> AbstractContextManager[Any]:
+    """A progress bar, if the output is visible, or `None` if tqdm is not installed."""
+    # `None` means only on a terminal.
+    hidden = None
+    try:
+        from tqdm import tqdm
 
-    def __init__(self, total: int, already: int, wanted: bool) -> None:
-        # `None` means only on a terminal.
-        hidden = None
-        try:
-            from tqdm import tqdm
+        if _in_notebook():
+            from tqdm import notebook
 
-            if _in_notebook():
-                from tqdm import notebook
-
-                hidden = False
-                # Without ipywidgets the bar is a text, because `tqdm.auto` would warn.
-                if notebook.IProgress is not None:
-                    tqdm = notebook.tqdm
-        except ImportError:
-            wanted = False
-        self._bar = tqdm(total=total, initial=already, unit=" settings", disable=hidden) if wanted else None
-
-    def __enter__(self) -> "_Bar":
-        return self
-
-    def update(self, settings: int) -> None:
-        if self._bar is not None:
-            self._bar.update(settings)
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
+            hidden = False
+            # Without ipywidgets the bar is a text, because `tqdm.auto` would warn.
+            if notebook.IProgress is not None:
+                tqdm = notebook.tqdm
+    except ImportError:
+        return nullcontext()
+    bar: AbstractContextManager[Any] = tqdm(total=total, initial=already, unit=" settings", disable=hidden)
+    return bar
 
 
 def _publish(part: Path, file: Path) -> None:

@@ -8,14 +8,13 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from . import dynamics
-from ._fields import number, shown
+from ._fields import Floats, number, shown
 from ._native import Arm, Batch
 
 __all__ = ["STEP", "TIMESTEP", "Action", "Floats", "Observation", "Reach", "SwingUp", "Task"]
 
 Observation = NDArray[np.float32]
 Action = NDArray[np.float32]
-Floats = NDArray[np.float64]
 
 STEP = 0.05
 """Simulation time [s] of a step of an environment."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
+from ._fields import Floats
 from ._native import Arm
 
 __all__ = [
@@ -23,8 +24,6 @@ __all__ = [
     "stability",
     "suggest_gains",
 ]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -167,11 +166,7 @@ def suggest_gains(
     `margin`, at least 1, is the required ratio of the smallest timestep limit over all poses to the timestep. Ten
     moves must settle within `settling_time` [s]. Raises `ValueError` if there are no such gains.
     """
-    return SuggestedGains(
-        **_native.suggest_gains(
-            arm, settling_time=settling_time, margin=margin, timestep=timestep, integrator=integrator
-        )
-    )
+    return SuggestedGains(**_native.suggest_gains(locals()))
 
 
 def stability(
@@ -190,9 +185,7 @@ def stability(
     `setpoint` [rad] is the starting pose by default. `q` [rad] and `qd` [rad/s] are the state at the start of the
     coming motion. The law runs once per `control_period` [s], 0 for every step.
     """
-    found = _native.stability(
-        arm, integrator=integrator, gains=gains, setpoint=setpoint, q=q, qd=qd, control_period=control_period
-    )
+    found = _native.stability(locals())
     critical = found.pop("critical")
     return Stability(**found, critical=None if critical is None else Critical(**critical))
 
@@ -219,21 +212,7 @@ def rollout(
     `reference` the run is compared with the true motion under the same held control law, and with the loop whose law
     acts at every instant. The law runs once per `control_period` [s], 0 for every step.
     """
-    return Rollout(
-        **_native.rollout(
-            arm,
-            q0=q0,
-            qdot0=qdot0,
-            duration=duration,
-            timestep=timestep,
-            integrator=integrator,
-            gains=gains,
-            setpoint=setpoint,
-            samples=samples,
-            reference=reference,
-            control_period=control_period,
-        )
-    )
+    return Rollout(**_native.rollout(locals()))
 
 
 def plan(
@@ -255,15 +234,4 @@ def plan(
     as error, unless the `control_period` [s] is given. A missing member of `gains` is zeros. Raises `ValueError` if
     the motion cannot be known that well for that long.
     """
-    return Plan(
-        **_native.plan(
-            error,
-            arm,
-            duration=duration,
-            q0=q0,
-            qdot0=qdot0,
-            gains=gains,
-            setpoint=setpoint,
-            control_period=control_period,
-        )
-    )
+    return Plan(**_native.plan(locals()))

@@ -4,7 +4,7 @@
 
 use numpy::{PyArray1, PyArrayMethods};
 use pendularm::math::integrator::Method;
-use pyo3::prelude::{PyAnyMethods, PyResult};
+use pyo3::prelude::{PyAnyMethods, PyErr, PyResult};
 use pyo3::types::{PyByteArray, PyBytes, PyDict};
 
 use crate::arrays::{ArrayArgument, collected, laid_out, room};
@@ -34,6 +34,23 @@ fn entries<'py>(value: &Object<'py>, count: usize) -> PyResult<Option<Vec<Object
     Ok((all.len() == count).then_some(all))
 }
 
+/// One value for all arms, or one for each. `read` returns `None` for a value of another type.
+fn one_or_each<T>(
+    value: &Object<'_>,
+    arms: usize,
+    read: impl Fn(&Object<'_>) -> PyResult<Option<T>>,
+    expected: impl Fn() -> PyErr,
+) -> PyResult<Vec<T>> {
+    if let Some(alike) = read(value)? {
+        return Ok(vec![alike]);
+    }
+    let mut each = room(arms)?;
+    for one in entries(value, arms)?.ok_or_else(&expected)? {
+        each.push(read(&one)?.ok_or_else(&expected)?);
+    }
+    Ok(each)
+}
+
 /// One number of steps for all arms, or one for each.
 pub(super) fn read_steps(steps: &Object<'_>, arms: usize) -> PyResult<Vec<u64>> {
     let expected = || {
@@ -47,33 +64,21 @@ pub(super) fn read_steps(steps: &Object<'_>, arms: usize) -> PyResult<Vec<u64>> 
     if is_text || is_masked(steps)? {
         return Err(expected());
     }
-    if let Some(alike) = fields::count(steps) {
-        return Ok(vec![alike]);
-    }
-    let mut each = room(arms)?;
-    for one in entries(steps, arms)?.ok_or_else(expected)? {
-        each.push(fields::count(&one).ok_or_else(expected)?);
-    }
-    Ok(each)
+    one_or_each(steps, arms, |one| Ok(fields::count(one)), expected)
 }
 
 /// One method for all arms, or one for each.
 pub(super) fn read_methods(method: &Object<'_>, arms: usize) -> PyResult<Vec<Method>> {
-    if let Ok(alike) = method.extract::<String>() {
-        return Ok(vec![fields::method("method", &alike)?]);
-    }
-    let expected = || {
+    let read = |one: &Object<'_>| {
+        let name = one.extract::<String>().ok();
+        name.map(|name| fields::method("method", &name)).transpose()
+    };
+    one_or_each(method, arms, read, || {
         refused(format_args!(
             "method must be a name, or one for each of {arms} arms, got {}",
             shown(method)
         ))
-    };
-    let mut each = room(arms)?;
-    for one in entries(method, arms)?.ok_or_else(expected)? {
-        let name: String = one.extract().map_err(|_| expected())?;
-        each.push(fields::method("method", &name)?);
-    }
-    Ok(each)
+    })
 }
 
 /// One boolean for all arms, or one for each.
@@ -87,14 +92,7 @@ pub(super) fn read_flags(field: &str, flag: &Object<'_>, arms: usize) -> PyResul
     if is_masked(flag)? {
         return Err(expected());
     }
-    if let Ok(alike) = flag.extract() {
-        return Ok(vec![alike]);
-    }
-    let mut each = room(arms)?;
-    for one in entries(flag, arms)?.ok_or_else(expected)? {
-        each.push(one.extract().map_err(|_| expected())?);
-    }
-    Ok(each)
+    one_or_each(flag, arms, |one| Ok(one.extract().ok()), expected)
 }
 
 /// The value for an arm, from one for all or one for each.

@@ -12,6 +12,7 @@ use pendularm::math::kinematics::forward;
 use pendularm::math::pid::Gains;
 use pendularm::math::simulation::{Simulation, batch};
 
+use super::given::of_arm;
 use crate::arrays::{Rows, collected};
 
 /// Fewest lane-steps per additional thread: some tens of microseconds.
@@ -52,34 +53,11 @@ impl Shown<'_> {
     }
 }
 
-/// The number of steps, per lane or for all.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Steps<'a> {
-    Alike(u64),
-    Each(&'a [u64]),
-}
-
-impl Steps<'_> {
-    pub(crate) fn of(&self, lane: usize) -> u64 {
-        match self {
-            Self::Alike(steps) => *steps,
-            Self::Each(steps) => steps.get(lane).copied().unwrap_or(0),
-        }
-    }
-
-    /// The largest number of steps of a lane.
-    pub(crate) fn most(&self) -> u64 {
-        match self {
-            Self::Alike(steps) => *steps,
-            Self::Each(steps) => steps.iter().copied().max().unwrap_or(0),
-        }
-    }
-}
-
 /// A part of the lanes' steps.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece<'a> {
-    pub(crate) steps: Steps<'a>,
+    /// The number of steps of every lane, or one per lane.
+    pub(crate) steps: &'a [u64],
     /// Effort that is added in all these steps, in place of a lane's disturbance.
     pub(crate) effort: Option<&'a Rows<'a>>,
     /// The number of steps already taken, and of those taken now.
@@ -133,7 +111,7 @@ impl Piece<'_> {
             && let Some(effort) = self.effort
         {
             for (index, lane) in lanes.iter_mut().enumerate() {
-                let steps = self.steps.of(first + index);
+                let steps = of_arm(self.steps, first + index).unwrap_or(0);
                 if steps > 0 {
                     let duration = in_f64(steps) * lane.timestep();
                     lane.disturb(effort.row(first + index), duration);
@@ -141,7 +119,8 @@ impl Piece<'_> {
             }
         }
         batch::advance(lanes.iter_mut().enumerate().map(|(index, lane)| {
-            let left = self.steps.of(first + index).saturating_sub(self.done);
+            let steps = of_arm(self.steps, first + index).unwrap_or(0);
+            let left = steps.saturating_sub(self.done);
             (lane, left.min(self.length))
         }));
         if self.effort.is_some() {
@@ -153,9 +132,9 @@ impl Piece<'_> {
 }
 
 /// Ends the effort of interrupted steps.
-pub(crate) fn end_effort<const N: usize>(lanes: &mut [Simulation<N>], steps: Steps<'_>) {
+pub(crate) fn end_effort<const N: usize>(lanes: &mut [Simulation<N>], steps: &[u64]) {
     for (index, lane) in lanes.iter_mut().enumerate() {
-        if steps.of(index) > 0 {
+        if of_arm(steps, index).unwrap_or(0) > 0 {
             end_disturbance(lane);
         }
     }

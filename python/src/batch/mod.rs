@@ -21,12 +21,12 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::{ControlPeriod, Simulation};
 use pyo3::prelude::{Py, PyAny, PyResult, Python, pyclass, pymethods};
 
-use crate::arm::for_either;
+use crate::arm::{Either, for_either};
 use crate::arrays::{ArrayArgument, Rows, read_only};
 use crate::fields::{self, Bound, Flag, Held, Object, Whole, refused};
 use crate::patience::{Turns, hold};
 use given::{chosen, of_arm, read, read_flags, read_methods, read_steps};
-use lanes::{Piece, Steps};
+use lanes::Piece;
 use pool::pool;
 use windows::Windows;
 
@@ -38,13 +38,6 @@ const MOST_ARMS: usize = 1_000_000;
 
 /// Most threads that share the work of one batch.
 const MOST_THREADS: usize = 1024;
-
-/// The number of links never changes. A lock protects the state, because threads may share a batch.
-#[derive(Debug)]
-enum Either {
-    Two(Mutex<Vec<Simulation<2>>>),
-    Three(Mutex<Vec<Simulation<3>>>),
-}
 
 /// Many arms, advanced in whole steps. Each is bit-identical to a `Simulation`, for any number of threads.
 ///
@@ -58,7 +51,8 @@ enum Either {
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Batch {
-    own: Either,
+    /// The number of links never changes. A lock protects the state, because threads may share a batch.
+    own: Either<Mutex<Vec<Simulation<2>>>, Mutex<Vec<Simulation<3>>>>,
     arms: usize,
     threads: usize,
     windows: Windows,
@@ -125,16 +119,7 @@ impl Batch {
         steps: Option<&Object<'_>>,
         effort: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        let counts = steps
-            .map(|steps| read_steps(steps, self.arms))
-            .transpose()?;
-        let steps = match &counts {
-            None => Steps::Alike(1),
-            Some(counts) => match counts.as_slice() {
-                [alike] => Steps::Alike(*alike),
-                each => Steps::Each(each),
-            },
-        };
+        let steps = steps.map_or_else(|| Ok(vec![1]), |steps| read_steps(steps, self.arms))?;
         let effort = read("effort", effort)?;
         let effort = self.rows(effort.as_ref(), Bound::Finite)?;
         let pool = pool(self.threads);
@@ -142,18 +127,18 @@ impl Batch {
         let threads = u64::try_from(self.threads).unwrap_or(1);
         let length = (threads.saturating_mul(STEPS_PER_LOOK) / arms).max(1);
         let first = Piece {
-            steps,
+            steps: &steps,
             effort: effort.as_ref(),
             done: 0,
             length,
             is_shared: pool.is_some(),
         };
         let _turn = self.turns.take(py)?;
-        let taken = for_either!(Either, &self.own, lanes => {
+        let taken = for_either!(&self.own, lanes => {
             stepping::take(py, lanes, &self.windows, pool.as_deref(), first)
         });
         if taken.is_err() && effort.is_some() {
-            for_either!(Either, &self.own, lanes => lanes::end_effort(&mut hold(py, lanes), steps));
+            for_either!(&self.own, lanes => lanes::end_effort(&mut hold(py, lanes), &steps));
         }
         taken
     }
@@ -164,7 +149,7 @@ impl Batch {
     fn reset(&self, py: Python<'_>, arms: Option<&Object<'_>>) -> PyResult<()> {
         let chosen = chosen(arms, self.arms)?;
         let _turn = self.turns.take(py)?;
-        for_either!(Either, &self.own, lanes => {
+        for_either!(&self.own, lanes => {
             let mut lanes = hold(py, lanes);
             let lanes = lanes.as_mut_slice();
             self.windows.write(py, |shown| {
@@ -197,7 +182,7 @@ impl Batch {
             .map(|given| given.rows(Some(chosen.len()), self.links(), Bound::Finite))
             .transpose()?;
         let _turn = self.turns.take(py)?;
-        for_either!(Either, &self.own, lanes => {
+        for_either!(&self.own, lanes => {
             let mut lanes = hold(py, lanes);
             let lanes = lanes.as_mut_slice();
             self.windows.write(py, |shown| {
@@ -227,7 +212,7 @@ impl Batch {
         let velocities = read("velocities", velocities)?;
         let velocities = self.rows(velocities.as_ref(), Bound::Finite)?;
         let _turn = self.turns.take(py)?;
-        for_either!(Either, &self.own, lanes => {
+        for_either!(&self.own, lanes => {
             for (row, one) in hold(py, lanes).iter_mut().enumerate() {
                 one.set_setpoint(Setpoint {
                     position: positions.row(row),
@@ -252,7 +237,7 @@ impl Batch {
         let ki = self.rows(ki.as_ref(), Bound::NotNegative)?;
         let kd = self.rows(kd.as_ref(), Bound::NotNegative)?;
         let _turn = self.turns.take(py)?;
-        for_either!(Either, &self.own, lanes => {
+        for_either!(&self.own, lanes => {
             for (row, one) in hold(py, lanes).iter_mut().enumerate() {
                 let present = *one.pid().gains();
                 one.set_gains(Gains {
@@ -283,7 +268,7 @@ impl Batch {
         let masses = self.rows(masses.as_ref(), Bound::Positive)?;
         let lengths = self.rows(lengths.as_ref(), Bound::Positive)?;
         let _turn = self.turns.take(py)?;
-        for_either!(Either, &self.own, lanes => {
+        for_either!(&self.own, lanes => {
             for (row, one) in hold(py, lanes).iter_mut().enumerate() {
                 let present = one.arm();
                 let arm = Arm::new(
@@ -311,7 +296,7 @@ impl Batch {
         let timestep = read("timestep", timestep)?;
         let timestep = self.column(timestep.as_ref(), Bound::Positive)?;
         let _turn = self.turns.take(py)?;
-        for_either!(Either, &self.own, lanes => {
+        for_either!(&self.own, lanes => {
             for (row, one) in hold(py, lanes).iter_mut().enumerate() {
                 let method = methods.as_deref().and_then(|methods| of_arm(methods, row));
                 one.set_method(method.unwrap_or(one.method()));
@@ -338,7 +323,7 @@ impl Batch {
         let periods = read("control_period", control_period)?;
         let periods = self.column(periods.as_ref(), Bound::NotNegative)?;
         let _turn = self.turns.take(py)?;
-        for_either!(Either, &self.own, lanes => {
+        for_either!(&self.own, lanes => {
             for (row, one) in hold(py, lanes).iter_mut().enumerate() {
                 let present = one.control_period();
                 let delay = delays.as_deref().and_then(|delays| of_arm(delays, row));
@@ -356,7 +341,7 @@ impl Batch {
     fn enable(&self, py: Python<'_>, data: Flag) -> PyResult<()> {
         let data = data.read("data")?;
         let _turn = self.turns.take(py)?;
-        for_either!(Either, &self.own, lanes => {
+        for_either!(&self.own, lanes => {
             let mut lanes = hold(py, lanes);
             let lanes = lanes.as_mut_slice();
             self.windows.write(py, |shown| {
@@ -375,10 +360,7 @@ impl Batch {
     /// Number of links of each arm, 2 or 3.
     #[getter]
     fn links(&self) -> usize {
-        match &self.own {
-            Either::Two(_) => 2,
-            Either::Three(_) => 3,
-        }
+        self.own.links()
     }
 
     /// Number of threads that share the work. There are fewer if the system refuses some.
@@ -420,14 +402,14 @@ impl Batch {
     /// Kinetic plus potential energy [J], (`n_arms`,), in a fresh array.
     #[getter]
     fn energy<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray1<f64>>> {
-        let energies = for_either!(Either, &self.own, lanes => lanes::energies(&hold(py, lanes))?);
+        let energies = for_either!(&self.own, lanes => lanes::energies(&hold(py, lanes))?);
         read_only(energies.into_pyarray(py))
     }
 
     /// Positions of the end effectors [m], (`n_arms`, 2), in a fresh array.
     #[getter]
     fn end_effector<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray2<f64>>> {
-        let flat = for_either!(Either, &self.own, lanes => lanes::end_effectors(&hold(py, lanes))?);
+        let flat = for_either!(&self.own, lanes => lanes::end_effectors(&hold(py, lanes))?);
         read_only(flat.into_pyarray(py))?.reshape([self.arms, 2])
     }
 

@@ -21,7 +21,8 @@ pub(super) fn take<const N: usize>(
     first: Piece<'_>,
 ) -> PyResult<()> {
     let mut piece = first;
-    while piece.done < piece.steps.most() {
+    let most = piece.steps.iter().copied().max().unwrap_or(0);
+    while piece.done < most {
         {
             let mut arms = hold(py, arms);
             let arms = arms.as_mut_slice();

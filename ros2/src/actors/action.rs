@@ -9,16 +9,17 @@ use actix::prelude::*;
 use pendularm::protocol::catalog::Action;
 use pendularm::protocol::catalog::types;
 use pendularm::protocol::catalog::types::Type;
+use pendularm::protocol::messages::Stamp;
 use pendularm::protocol::ros::cdr;
 use serde_json::{Value, json};
 use zenoh::Session;
 
 use super::endpoints::Endpoints;
 use super::gateway::Gateway;
-use super::goals::{Goal, GoalId, GoalTable, Stamp};
+use super::goals::{Goal, GoalId, GoalTable, now, read_stamp};
 use super::inlet::{Inlet, Request};
 use super::outlet::Outlet;
-use super::{Cancel, ForwardGoal, GoalEvent, GoalUpdate, Leave, MAILBOX};
+use super::{Cancel, ForwardGoal, GoalEvent, GoalUpdate, MAILBOX};
 use crate::convention::EndpointKind;
 use crate::convention::hash::type_hash;
 use crate::interfaces::{ActionInterface, ServiceInterface, cancel_goal};
@@ -122,7 +123,7 @@ impl ActionBridge {
         let goal = translation::arguments(self.action.goal_fields(), &mut goal);
         if let Err(request) = self.goals.begin(id, request) {
             // The id exists already, or there are too many goals.
-            return self.tell_acceptance(request, false, Stamp::now());
+            return self.tell_acceptance(request, false, now());
         }
         let forwarded = ForwardGoal {
             action: self.action,
@@ -143,7 +144,7 @@ impl ActionBridge {
     }
 
     fn tell_acceptance(&self, request: Request, is_accepted: bool, stamp: Stamp) {
-        let response = json!({"accepted": is_accepted, "stamp": stamp.json()});
+        let response = json!({"accepted": is_accepted, "stamp": stamp});
         request.respond(&self.interface.send_goal, &response);
     }
 
@@ -199,7 +200,7 @@ impl ActionBridge {
         let Some(id) = GoalId::read(info) else {
             return request.refuse("no goal_id");
         };
-        let (code, cancelled) = self.goals.cancel(id, Stamp::read(info));
+        let (code, cancelled) = self.goals.cancel(id, read_stamp(info));
         for id in &cancelled {
             self.gateway.do_send(Cancel {
                 action: self.action,
@@ -272,10 +273,4 @@ impl Handler<GoalUpdate> for ActionBridge {
     }
 }
 
-impl Handler<Leave> for ActionBridge {
-    type Result = ();
-
-    fn handle(&mut self, _: Leave, ctx: &mut Self::Context) {
-        ctx.stop();
-    }
-}
+stops_with_the_arm!(ActionBridge);

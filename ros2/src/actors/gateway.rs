@@ -101,9 +101,7 @@ impl Gateway {
         // The caller may have ended meanwhile.
         let _ = waiting.send(Ok(answer));
     }
-}
 
-impl Gateway {
     /// Passes an event of a goal, made of the frame's status and values, to its sender.
     fn tell_of_goal(&mut self, mut frame: Value, event: impl FnOnce(i8, Value) -> GoalEvent) {
         let id = text(&frame, "id").to_owned();

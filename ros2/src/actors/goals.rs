@@ -5,6 +5,7 @@
 use std::collections::VecDeque;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use pendularm::protocol::messages::Stamp;
 use serde_json::{Value, json};
 
 /// Most stored goals, including ended ones for late requests.
@@ -27,13 +28,6 @@ const GOAL_ENDED: i8 = 3;
 /// A goal's id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GoalId([u8; 16]);
-
-/// A time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Stamp {
-    sec: i64,
-    nanosec: u64,
-}
 
 /// A goal.
 #[derive(Debug)]
@@ -78,8 +72,7 @@ impl GoalId {
     /// The id of the goal at the arm.
     #[must_use]
     pub fn text(self) -> String {
-        let hex = self.0.iter().map(|byte| format!("{byte:02x}"));
-        PREFIX.chars().map(String::from).chain(hex).collect()
+        format!("{PREFIX}{:032x}", u128::from_be_bytes(self.0))
     }
 
     /// The goal with that id at the arm.
@@ -94,35 +87,27 @@ impl GoalId {
     }
 }
 
-impl Stamp {
-    const ZERO: Self = Self { sec: 0, nanosec: 0 };
-
-    /// The present time.
-    #[must_use]
-    pub fn now() -> Self {
-        let since = SystemTime::now()
-            .duration_since(UNIX_EPOCH)
-            .unwrap_or_default();
-        Self {
-            sec: i64::try_from(since.as_secs()).unwrap_or(i64::MAX),
-            nanosec: since.subsec_nanos().into(),
-        }
+/// The present time.
+#[must_use]
+pub fn now() -> Stamp {
+    let since = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    Stamp {
+        sec: i32::try_from(since.as_secs()).unwrap_or(i32::MAX),
+        nanosec: since.subsec_nanos(),
     }
+}
 
-    /// The member `stamp` of a message.
-    #[must_use]
-    pub fn read(message: &Value) -> Self {
-        let part = |name: &str| message.pointer("/stamp").and_then(|stamp| stamp.get(name));
-        Self {
-            sec: part("sec").and_then(Value::as_i64).unwrap_or_default(),
-            nanosec: part("nanosec").and_then(Value::as_u64).unwrap_or_default(),
-        }
-    }
-
-    /// The same as a member of a message.
-    #[must_use]
-    pub fn json(self) -> Value {
-        json!({"sec": self.sec, "nanosec": self.nanosec})
+/// The member `stamp` of a message.
+#[must_use]
+pub fn read_stamp(message: &Value) -> Stamp {
+    let part = |place: &str| message.pointer(place).and_then(Value::as_i64);
+    let sec = part("/stamp/sec").and_then(|sec| i32::try_from(sec).ok());
+    let nanosec = part("/stamp/nanosec").and_then(|nanosec| u32::try_from(nanosec).ok());
+    Stamp {
+        sec: sec.unwrap_or_default(),
+        nanosec: nanosec.unwrap_or_default(),
     }
 }
 
@@ -148,7 +133,7 @@ impl<R> GoalTable<R> {
         }
         self.0.push_back(Goal {
             id,
-            stamp: Stamp::now(),
+            stamp: now(),
             status: ACCEPTED,
             asked: Some(asked),
             waiting: Vec::new(),
@@ -204,8 +189,8 @@ impl<R> GoalTable<R> {
             return (UNKNOWN_GOAL, Vec::new());
         }
         let is_meant = |goal: &Goal<R>| {
-            let in_time = goal.stamp <= until || (id.is_zero() && until == Stamp::ZERO);
-            goal.id == id || (in_time && (id.is_zero() || until != Stamp::ZERO))
+            let in_time = goal.stamp <= until || (id.is_zero() && until == Stamp::default());
+            goal.id == id || (in_time && (id.is_zero() || until != Stamp::default()))
         };
         let meant = self.0.iter_mut().filter(|goal| is_meant(goal));
         let running: Vec<_> = meant.filter(|goal| goal.result.is_none()).collect();
@@ -221,8 +206,8 @@ impl<R> GoalTable<R> {
 
     /// A goal as `action_msgs/msg/GoalInfo`.
     pub fn info(&mut self, id: GoalId) -> Value {
-        let stamp = self.get(id).map_or(Stamp::ZERO, |goal| goal.stamp);
-        json!({"goal_id": id.json(), "stamp": stamp.json()})
+        let stamp = self.get(id).map(|goal| goal.stamp).unwrap_or_default();
+        json!({"goal_id": id.json(), "stamp": stamp})
     }
 
     /// All as `action_msgs/msg/GoalStatusArray`, except goals without a message from the arm.
@@ -231,7 +216,7 @@ impl<R> GoalTable<R> {
         let known = self.0.iter().filter(|goal| goal.asked.is_none());
         let list: Vec<Value> = known
             .map(|goal| {
-                let info = json!({"goal_id": goal.id.json(), "stamp": goal.stamp.json()});
+                let info = json!({"goal_id": goal.id.json(), "stamp": goal.stamp});
                 json!({"goal_info": info, "status": goal.status})
             })
             .collect();
@@ -292,7 +277,7 @@ mod tests {
     #[test]
     fn cancelling_means_one_goal_or_all_or_all_up_to_a_time() {
         let mut goals = running(3);
-        let never = Stamp::ZERO;
+        let never = Stamp::default();
         assert_eq!(goals.cancel(id(2), never), (DONE, vec![id(2)]));
         assert_eq!(goals.cancel(id(9), never), (UNKNOWN_GOAL, vec![]));
         goals.end(id(1), 4, json!({}));
@@ -300,10 +285,7 @@ mod tests {
         assert_eq!(goals.cancel(id(0), never), (DONE, vec![id(2), id(3)]));
         let early = Stamp { sec: 1, nanosec: 0 };
         assert_eq!(goals.cancel(id(0), early), (DONE, vec![]));
-        assert_eq!(
-            goals.cancel(id(0), Stamp::now()),
-            (DONE, vec![id(2), id(3)])
-        );
+        assert_eq!(goals.cancel(id(0), now()), (DONE, vec![id(2), id(3)]));
         assert_eq!(goals.status()["status_list"][1]["status"], CANCELING);
     }
 

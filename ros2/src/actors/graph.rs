@@ -60,17 +60,10 @@ impl GraphBridge {
     pub fn new(options: Options) -> Self {
         let rosapi = Rosapi::ALL.into_iter().map(Service::Rosapi);
         let services = Service::ALL.into_iter().chain(rosapi);
-        let interface = |service: Service| {
-            ServiceInterface::of_catalogue(
-                service.type_name(),
-                service.fields(),
-                service.response_fields(),
-            )
-        };
         Self {
             options,
             services: services
-                .map(|service| (service, Rc::new(interface(service))))
+                .map(|service| (service, Rc::new(ServiceInterface::of_catalogue(service))))
                 .collect(),
             actions: Action::ALL
                 .into_iter()

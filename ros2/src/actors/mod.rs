@@ -12,6 +12,19 @@
 //!
 //! **Invariant:** mailboxes are bounded. A full one refuses a message, and the sender gets an error.
 
+/// Stops a bridge when the arm has disconnected.
+macro_rules! stops_with_the_arm {
+    ($bridge:ident) => {
+        impl actix::Handler<$crate::actors::Leave> for $bridge {
+            type Result = ();
+
+            fn handle(&mut self, _: $crate::actors::Leave, ctx: &mut Self::Context) {
+                ctx.stop();
+            }
+        }
+    };
+}
+
 pub mod action;
 mod endpoints;
 pub mod gateway;

@@ -11,7 +11,7 @@ use zenoh::Session;
 
 use super::gateway::Gateway;
 use super::outlet::Outlet;
-use super::{ArmMessage, Leave, Listen, MAILBOX};
+use super::{ArmMessage, Listen, MAILBOX};
 use crate::convention::Endpoint;
 
 /// A topic in the graph.
@@ -88,10 +88,4 @@ impl Handler<ArmMessage> for Publisher {
     }
 }
 
-impl Handler<Leave> for Publisher {
-    type Result = ();
-
-    fn handle(&mut self, _: Leave, ctx: &mut Self::Context) {
-        ctx.stop();
-    }
-}
+stops_with_the_arm!(Publisher);

@@ -10,7 +10,7 @@ use zenoh::Session;
 
 use super::gateway::Gateway;
 use super::inlet::{Inlet, Request};
-use super::{Answer, CallArm, Leave, MAILBOX};
+use super::{Answer, CallArm, MAILBOX};
 use crate::convention::Endpoint;
 use crate::interfaces::ServiceInterface;
 use crate::translation;
@@ -84,13 +84,7 @@ impl Handler<Requested> for ServiceBridge {
     }
 }
 
-impl Handler<Leave> for ServiceBridge {
-    type Result = ();
-
-    fn handle(&mut self, _: Leave, ctx: &mut Self::Context) {
-        ctx.stop();
-    }
-}
+stops_with_the_arm!(ServiceBridge);
 
 /// Replies with the arm's answer.
 fn reply(request: Request, interface: &ServiceInterface, answer: Answer) {

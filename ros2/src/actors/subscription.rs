@@ -12,7 +12,7 @@ use zenoh::sample::Sample;
 use zenoh::{Session, Wait};
 
 use super::gateway::Gateway;
-use super::{Leave, MAILBOX, PublishToArm};
+use super::{MAILBOX, PublishToArm};
 use crate::convention::Endpoint;
 use crate::report::{self, Repeated};
 
@@ -87,10 +87,4 @@ impl Handler<Taken> for Subscription {
     }
 }
 
-impl Handler<Leave> for Subscription {
-    type Result = ();
-
-    fn handle(&mut self, _: Leave, ctx: &mut Self::Context) {
-        ctx.stop();
-    }
-}
+stops_with_the_arm!(Subscription);

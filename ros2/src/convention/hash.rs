@@ -20,8 +20,7 @@ const NESTED: u32 = 1;
 #[must_use]
 pub fn type_hash(first: Type, beside: &[Type]) -> String {
     let digest = Sha256::digest(description(first, beside));
-    let hex: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-    format!("RIHS01_{hex}")
+    format!("RIHS01_{digest:x}")
 }
 
 /// The hashed text.

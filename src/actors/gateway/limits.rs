@@ -67,6 +67,9 @@ pub const RESPONSES_TIME: Duration = Duration::from_secs(15);
 pub(super) const READ_BYTES: usize = 32 * KIB;
 /// Bytes offered in one write. After half of them, other connections have a turn.
 pub(super) const WRITE_BYTES: usize = 64 * 1024;
+// When a client may be read again, its writer has written this much in a turn, or waits for the socket. Either wakes the
+// reader.
+const _: () = assert!(MAX_RESPONSES_WAITING >= WRITE_BYTES / 2);
 /// Frames in one write.
 pub(super) const WRITE_FRAMES: usize = 64;
 /// Frames after which the reader yields. Also messages of a WebSocket that are read ahead of the next op.

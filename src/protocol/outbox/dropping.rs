@@ -34,8 +34,9 @@ impl Outbox {
         fits
     }
 
-    /// Drops messages that have waited too long, except the newest of each topic.
-    pub(super) fn drop_old(&mut self, now: Instant) {
+    /// Queues held messages that are due. Drops queued ones that are too old, except the newest of each topic.
+    pub(super) fn advance(&mut self, now: Instant) {
+        self.release(now);
         while let Some(next) = self.topics.get(self.kept_old) {
             let age = if self.is_behind {
                 MAX_AGE_BEHIND

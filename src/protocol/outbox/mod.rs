@@ -84,7 +84,7 @@ impl Outbox {
     /// Adds a message on a topic, or a series. It is queued, or held back if the topic is throttled. If it does
     /// not fit, the oldest messages are dropped.
     pub fn push(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
-        self.release(now);
+        self.advance(now);
         if !self.may_fit(&frame) {
             return;
         }
@@ -94,7 +94,6 @@ impl Outbox {
         } else {
             self.enqueue(Some(topic), now, frame);
         }
-        self.drop_old(now);
         self.keep_bounded();
         self.check_sums();
     }
@@ -120,8 +119,7 @@ impl Outbox {
     /// Moves the next frames to [those being written](Self::writing): as many as `max_frames` and `max_bytes`
     /// allow, and at least one if any waits. A series counts as one frame, unless `max_frames` is 1.
     pub fn take_frames(&mut self, now: Instant, max_frames: usize, max_bytes: usize) {
-        self.release(now);
-        self.drop_old(now);
+        self.advance(now);
         let (mut bytes, mut taken) = (0, 0);
         while taken < max_frames.max(1) {
             let topic = self.topics.front().map_or(u64::MAX, |topic| topic.number);

@@ -9,13 +9,13 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use pendularm::actors::arm::sim::Obstacle;
+use pendularm_client::codec::Event;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 use serde_json::value::RawValue;
 use tokio::time::Instant;
 
 use self::body::Body;
-use crate::client::Received;
 use crate::court::Court;
 use crate::honest::{Honest, Phase};
 use crate::json::Json;
@@ -129,13 +129,13 @@ pub struct Model {
 
 impl Model {
     /// One client receives one frame.
-    pub fn hear(&mut self, court: &Court, honest: &mut Honest, received: Received) {
+    pub fn hear(&mut self, court: &Court, honest: &mut Honest, received: Event) {
         match received {
-            Received::Json(text) => {
+            Event::Text(text) => {
                 court.note("received", text.as_bytes());
                 self.hear_text(court, honest, &text);
             }
-            Received::Binary(bytes) => {
+            Event::Binary(bytes) => {
                 court.note("received", &bytes);
                 let Some(frame) = crate::cbor::read(&bytes) else {
                     return court.wrong(format!(
@@ -153,6 +153,7 @@ impl Model {
                     None => court.wrong(format!("a binary frame without a message: {frame:?}")),
                 }
             }
+            Event::Ping(_) | Event::Pong(_) | Event::Close(..) => {}
         }
     }
 

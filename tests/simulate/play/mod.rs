@@ -8,7 +8,9 @@ mod rest;
 use std::rc::Rc;
 use std::time::Duration;
 
-use crate::client::{Client, Door};
+use pendularm_client::codec::Framing;
+
+use crate::client::Client;
 use crate::court::{Court, Failure, Verdict};
 use crate::honest::Honest;
 use crate::hostile::Hostile;
@@ -111,13 +113,13 @@ impl Course {
 
     fn connect(&self, room: usize) -> (Client, Rc<std::cell::Cell<Fate>>) {
         let (stream, fate) = self.world.connect(room);
-        let door = match self.court.chance(self.plan.socket) {
-            true => Door::Socket,
-            false => Door::Plain,
+        let framing = match self.court.chance(self.plan.socket) {
+            true => Framing::WebSocket,
+            false => Framing::Lines,
         };
         let is_honest = room == self.plan.room;
         let piece = if is_honest { self.plan.piece } else { room };
-        (Client::new(door, stream, piece), fate)
+        (Client::new(framing, stream, piece), fate)
     }
 
     async fn run(&mut self) {

@@ -11,10 +11,10 @@ use std::time::Duration;
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::protocol::outbox::MAX_TOPIC_BYTES;
+use pendularm_client::codec::Framing;
 use serde_json::Value;
 use tokio::time::Instant;
 
-use crate::client::Door;
 use crate::court::Court;
 use crate::honest::{Call, Expect, Honest, Phase, Subscription};
 use crate::model::{Forward, Message, Model, absolute};

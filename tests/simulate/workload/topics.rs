@@ -145,8 +145,8 @@ impl Workload<'_> {
     pub(super) fn subscribe(&mut self, feature: Feature) {
         let topic = self.court.among(&TOPICS);
         let spelling = self.spelled(topic);
-        let door = self.me().door;
-        let is_binary = feature == Feature::Cbor && door == Door::Socket;
+        let framing = self.me().client.framing();
+        let is_binary = feature == Feature::Cbor && framing == Framing::WebSocket;
         let throttle = (feature == Feature::Throttle)
             .then(|| Duration::from_millis(20 + self.court.below(300) as u64));
         let known = self.me().subscriptions.get(&spelling);

@@ -176,15 +176,10 @@ fn endure(attack: &Attack, plan: &Plan) -> Result<Row, String> {
         (health, peak, ended)
     });
     Ok(Row {
-        name: attack.name,
+        attack: *attack,
         health,
-        newcomers_welcome: !attack.fills,
         peak: peak.unwrap_or(f64::NAN),
-        ended: if peak.is_some() {
-            ended
-        } else {
-            Err("it was gone before".to_owned())
-        },
+        ended: peak.ok_or("it was gone before".to_owned()).and(ended),
         deeds,
         attacked: !cast.is_empty(),
     })

@@ -4,6 +4,7 @@ use std::fmt;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use pendularm_benches::attack::Attack;
 use pendularm_benches::attack::stage::Deeds;
 use pendularm_benches::healthy::Health;
 
@@ -66,10 +67,8 @@ pub enum Verdict {
 
 /// The outcome of an attack.
 pub struct Row {
-    pub name: &'static str,
+    pub attack: Attack,
     pub health: Health,
-    /// New clients have a place, and must be served.
-    pub newcomers_welcome: bool,
     /// Resident memory \[MB\].
     pub peak: f64,
     /// Time from SIGTERM to the end, and the exit status.
@@ -125,7 +124,9 @@ impl Row {
             format!("{:.0}", health.longest_gap),
             health.longest_gap <= bars.gap,
         );
-        let welcome = health.served == health.visits || !self.newcomers_welcome;
+        // Otherwise new clients have a place, and must be served.
+        let is_full = self.attack.fills;
+        let welcome = is_full || health.served == health.visits;
         let served = mark(format!("{}/{}", health.served, health.visits), welcome);
         let peak = mark(format!("{:.0}", self.peak), self.peak <= bars.peak);
         let ended = match &self.ended {
@@ -142,18 +143,14 @@ impl Row {
         println!(
             "{:<21} {answered:>11} {p50:>8.1} {p99:>9} {most:>9.0} {gap:>10} {served:>8} {:>9.0} {peak:>8} \
              {ended:>8} {connections:>7} {:>8.1}",
-            self.name,
+            self.attack.name,
             health.longest_visit,
             sent as f64 / 1e6,
         );
         for fault in &health.faults {
             println!("     {}", shortened(fault));
         }
-        if let Some(fault) = health
-            .visit_fault
-            .as_ref()
-            .filter(|_| self.newcomers_welcome)
-        {
+        if let Some(fault) = health.visit_fault.as_ref().filter(|_| !is_full) {
             println!("     a newcomer: {}", shortened(fault));
         }
         if let Err(why) = &self.ended {

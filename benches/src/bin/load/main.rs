@@ -1,6 +1,6 @@
 //! Messages between many clients: pendularm beside redis (pub/sub) and mosquitto, the same messages in the same run.
 //!
-//! `load ports N` prints N free ports of loopback. `load PATH/TO/pendularm SERVER=ADDRESS=PID ... [--quick]` starts
+//! `load ports` prints two free ports of loopback. `load PATH/TO/pendularm SERVER=ADDRESS=PID ... [--quick]` starts
 //! pendularm and measures it beside servers that run already, for `benches/load/run.sh`. Round after round every scene
 //! is played to each server in turn, by the same client on one thread. The processor time of the server for a delivery
 //! is compared: it depends little on other work of the machine. Fails if a message is lost, comes twice or comes out of
@@ -23,54 +23,17 @@ const RATE: Traffic = Traffic::Rate(60.0);
 
 /// The scenes. The last fan-out is that of the arm's own topic.
 const SCENES: [Scene; 8] = [
+    Scene::new("60 Hz to 1", RATE, 1),
+    Scene::new("60 Hz to 10", RATE, 10),
+    Scene::new("60 Hz to 100", RATE, 100),
+    Scene::new("60 Hz to 250", RATE, 250),
+    Scene::new("the arm to 250", Traffic::Arm, 250),
+    Scene::new("flood 1 to 1", Traffic::Flood, 1),
     Scene {
-        name: "60 Hz to 1",
-        topics: 1,
-        subscribers: 1,
-        traffic: RATE,
-    },
-    Scene {
-        name: "60 Hz to 10",
-        topics: 1,
-        subscribers: 10,
-        traffic: RATE,
-    },
-    Scene {
-        name: "60 Hz to 100",
-        topics: 1,
-        subscribers: 100,
-        traffic: RATE,
-    },
-    Scene {
-        name: "60 Hz to 250",
-        topics: 1,
-        subscribers: 250,
-        traffic: RATE,
-    },
-    Scene {
-        name: "the arm to 250",
-        topics: 1,
-        subscribers: 250,
-        traffic: Traffic::Arm,
-    },
-    Scene {
-        name: "flood 1 to 1",
-        topics: 1,
-        subscribers: 1,
-        traffic: Traffic::Flood,
-    },
-    Scene {
-        name: "flood 4 to 4",
         topics: 4,
-        subscribers: 1,
-        traffic: Traffic::Flood,
+        ..Scene::new("flood 4 to 4", Traffic::Flood, 1)
     },
-    Scene {
-        name: "flood 1 to 50",
-        topics: 1,
-        subscribers: 50,
-        traffic: Traffic::Flood,
-    },
+    Scene::new("flood 1 to 50", Traffic::Flood, 50),
 ];
 
 /// Duration and number of rounds.
@@ -99,7 +62,7 @@ pub struct Played {
     pub outcomes: Vec<Outcome>,
     /// Processor time in a second without clients, round by round \[ns\].
     pub rests: Vec<f64>,
-    /// Times of light requests beside it \[ns\].
+    /// Times of light requests beside it \[ns\], in rising order.
     pub calls: Vec<u32>,
     /// Simulation time by wall time beside it, the arm's.
     pub clock: Option<f64>,
@@ -113,12 +76,7 @@ fn is_probed(scene: &Scene) -> bool {
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.first().is_some_and(|first| first == "ports") {
-        return print_free_ports(
-            arguments
-                .get(1)
-                .and_then(|count| count.parse().ok())
-                .unwrap_or(1),
-        );
+        return print_free_ports();
     }
     let quick = arguments.iter().any(|argument| argument == "--quick");
     let mut words = arguments
@@ -167,11 +125,9 @@ fn main() {
     }
 }
 
-fn print_free_ports(count: usize) {
-    let sockets: Vec<_> = (0..count)
-        .map(|_| TcpListener::bind("127.0.0.1:0").expect("a free port"))
-        .collect();
-    for socket in &sockets {
+fn print_free_ports() {
+    let sockets = [(); 2].map(|()| TcpListener::bind("127.0.0.1:0").expect("a free port"));
+    for socket in sockets {
         println!("{}", socket.local_addr().expect("bound").port());
     }
 }
@@ -232,16 +188,12 @@ fn play(scene: &Scene, servers: &[Server], plan: &Plan) -> Vec<(Protocol, Played
 }
 
 fn probe(scene: &Scene, server: &Server, seconds: f64, played: &mut Played) {
-    let Server {
-        protocol,
-        address,
-        pid,
-        ..
-    } = *server;
+    let (protocol, address) = (server.protocol, server.address);
     let fleet = Fleet::open(protocol, address, *scene);
     let caller = probe::caller(protocol, address);
     let clock = (protocol == Protocol::Pendularm).then(|| probe::clock(address));
-    fleet.run(pid, seconds);
+    fleet.run(server.pid, seconds);
     played.calls = caller.stop();
+    played.calls.sort_unstable();
     played.clock = clock.map(probe::Probe::stop);
 }

@@ -79,12 +79,8 @@ fn read(digits: &[u8]) -> u64 {
 /// The stamp of a message that the arm has published \[ns\].
 pub fn stamp(payload: &[u8]) -> u64 {
     let number = |key: &[u8]| {
-        let at = payload
-            .windows(key.len())
-            .position(|part| part == key)
-            .expect("a stamp")
-            + key.len();
-        payload[at..]
+        let at = memchr::memmem::find(payload, key).expect("a stamp");
+        payload[at + key.len()..]
             .iter()
             .take_while(|byte| byte.is_ascii_digit())
             .fold(0, |value, digit| 10 * value + u64::from(digit - b'0'))

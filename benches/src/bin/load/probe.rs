@@ -2,19 +2,21 @@
 //!
 //! **Invariant:** each probe has its own connection and thread, and sends few requests.
 
-use std::io::{ErrorKind, Read, Write};
+use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use crate::message::{now, stamp};
+use crate::message::now;
+use pendularm_benches::program::simulation_time;
 use pendularm_benches::protocol::{Event, Protocol};
+use pendularm_client::blocking;
 
 /// Between two requests.
 const PERIOD: Duration = Duration::from_millis(20);
-/// A request, or the next message of the arm, that takes longer fails the run.
+/// A request that takes longer fails the run.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A thread that probes until `stop` is set.
@@ -50,10 +52,7 @@ pub fn caller(protocol: Protocol, address: SocketAddr) -> Probe<Vec<u32>> {
             std::thread::sleep(PERIOD);
             let sent = Instant::now();
             client.stream.write_all(&request).expect("sent");
-            let answered = client.listen(PATIENCE, |event| {
-                matches!(event, Event::Answer).then_some(())
-            });
-            assert!(answered.is_some(), "{protocol:?} does not answer");
+            client.await_event(|event| matches!(event, Event::Answer));
             times.push(u32::try_from(sent.elapsed().as_nanos()).unwrap_or(u32::MAX));
         }
         times
@@ -64,17 +63,11 @@ pub fn caller(protocol: Protocol, address: SocketAddr) -> Probe<Vec<u32>> {
 /// and of the last are compared.
 pub fn clock(address: SocketAddr) -> Probe<f64> {
     Probe::start(move |stop| {
-        let mut client = Client::connect(Protocol::Pendularm, address);
-        let mut subscription = Vec::new();
-        Protocol::Pendularm.subscribe("/clock", &mut subscription);
-        client.stream.write_all(&subscription).expect("sent");
+        let mut client = blocking::Client::to(address);
+        client.subscribe("/clock");
         let mut received = Vec::new();
         while !stop.load(Ordering::Relaxed) {
-            let message = client.listen(PATIENCE, |event| match event {
-                Event::Message(payload) => Some((stamp(payload) as f64, now() as f64)),
-                _ => None,
-            });
-            received.push(message.expect("the arm publishes its time"));
+            received.push((simulation_time(&mut client), now() as f64 * 1e-9));
         }
         let second = received.len().min(60);
         let earliest = |part: &[(f64, f64)]| {
@@ -89,7 +82,7 @@ pub fn clock(address: SocketAddr) -> Probe<f64> {
     })
 }
 
-/// A plain connection.
+/// A plain connection to any of the servers.
 struct Client {
     protocol: Protocol,
     stream: TcpStream,
@@ -100,6 +93,7 @@ impl Client {
     fn connect(protocol: Protocol, address: SocketAddr) -> Self {
         let stream = TcpStream::connect(address).expect("the server accepts");
         stream.set_nodelay(true).expect("nodelay");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a timeout");
         let mut client = Self {
             protocol,
             stream,
@@ -109,40 +103,26 @@ impl Client {
         protocol.greet(99_999, &mut greeting);
         client.stream.write_all(&greeting).expect("sent");
         if protocol.greets_back() {
-            let greeted = client.listen(PATIENCE, |event| {
-                matches!(event, Event::Ready).then_some(())
-            });
-            assert!(greeted.is_some(), "{protocol:?} does not greet");
+            client.await_event(|event| matches!(event, Event::Ready));
         }
         client
     }
 
-    /// Reads until `wanted` accepts an event. Returns `None` if none arrives in time.
-    fn listen<T>(&mut self, patience: Duration, wanted: impl Fn(Event) -> Option<T>) -> Option<T> {
-        self.stream
-            .set_read_timeout(Some(patience))
-            .expect("a timeout");
+    /// Reads until `is_wanted` accepts an event.
+    fn await_event(&mut self, is_wanted: impl Fn(&Event) -> bool) {
         loop {
-            while let Some((event, length)) = (!self.unread.is_empty())
-                .then(|| self.protocol.next(&self.unread))
-                .flatten()
-            {
-                let found = wanted(event);
+            while let Some((event, length)) = self.protocol.next(&self.unread) {
+                let is_last = is_wanted(&event);
                 self.unread.drain(..length);
-                if found.is_some() {
-                    return found;
+                if is_last {
+                    return;
                 }
             }
             let mut chunk = [0; 4096];
             match self.stream.read(&mut chunk) {
                 Ok(0) => panic!("{:?} has closed a probe's connection", self.protocol),
                 Ok(read) => self.unread.extend_from_slice(&chunk[..read]),
-                Err(error)
-                    if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
-                {
-                    return None;
-                }
-                Err(error) => panic!("{:?}: {error}", self.protocol),
+                Err(error) => panic!("{:?} does not answer a probe: {error}", self.protocol),
             }
         }
     }

@@ -38,7 +38,8 @@ pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)]) {
         "RSS, MB"
     );
     for (protocol, played) in played {
-        let costs = costs(played);
+        let mut costs = costs(played);
+        costs.sort_unstable_by(f64::total_cmp);
         let mut latencies: Vec<u32> = played
             .outcomes
             .iter()
@@ -63,8 +64,8 @@ pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)]) {
             format!(
                 "{:.2} ({:.2} to {:.2})",
                 median(costs.clone()),
-                least(&costs),
-                most(&costs)
+                costs[0],
+                costs[costs.len() - 1]
             ),
             net(played),
             part(0.5),
@@ -73,9 +74,7 @@ pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)]) {
         );
     }
     for (protocol, played) in played.iter().filter(|(_, played)| !played.calls.is_empty()) {
-        let mut calls = played.calls.clone();
-        calls.sort_unstable();
-        let [p50, p99] = [0.5, 0.99].map(|part| quantile(&calls, part).unwrap_or_default());
+        let [p50, p99] = [0.5, 0.99].map(|part| quantile(&played.calls, part).unwrap_or_default());
         let clock = played.clock.map_or(String::new(), |clock| {
             format!("; simulation / wall time {clock:.5}")
         });
@@ -107,22 +106,17 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)]) {
         else {
             continue;
         };
-        let peers = peers_of(scene)
+        let peers: Vec<_> = peers_of(scene)
             .into_iter()
             .flatten()
-            .filter(|(protocol, _)| *protocol != Protocol::Pendularm);
-        let peers: Vec<_> = peers.collect();
+            .filter(|(protocol, _)| *protocol != Protocol::Pendularm)
+            .collect();
         if !peers.is_empty() {
-            let best = peers
-                .iter()
-                .map(|(_, peer)| median(costs(peer)))
-                .fold(f64::INFINITY, f64::min);
-            let best_net = peers
-                .iter()
-                .map(|(_, peer)| net(peer))
-                .fold(f64::INFINITY, f64::min);
-            let ratio = median(costs(ours)) / best;
-            let net = net(ours) / best_net;
+            let to_best = |cost: fn(&Played) -> f64| {
+                let costs = peers.iter().map(|(_, peer)| cost(peer));
+                cost(ours) / costs.fold(f64::INFINITY, f64::min)
+            };
+            let (ratio, net) = (to_best(|played| median(costs(played))), to_best(net));
             let what = format!(
                 "{}: CPU per delivery / better peer (less rest {net:.2})",
                 scene.name
@@ -146,9 +140,7 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)]) {
             );
         }
         if !ours.calls.is_empty() {
-            let mut calls = ours.calls.clone();
-            calls.sort_unstable();
-            let p99 = quantile(&calls, 0.99).unwrap_or_default();
+            let p99 = quantile(&ours.calls, 0.99).unwrap_or_default();
             verdict(
                 &format!("{}: call beside it, p99, ms", scene.name),
                 format!("{p99:.2}"),
@@ -197,14 +189,6 @@ fn net(played: &Played) -> f64 {
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
-fn least(values: &[f64]) -> f64 {
-    values.iter().copied().fold(f64::INFINITY, f64::min)
-}
-
-fn most(values: &[f64]) -> f64 {
-    values.iter().copied().fold(0.0, f64::max)
 }
 
 /// A quantile of sorted times \[ms\].

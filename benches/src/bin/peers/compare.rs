@@ -31,14 +31,10 @@ type Results = BTreeMap<String, Vec<f64>>;
 fn read_results(path: &Path) -> Results {
     let text = fs::read_to_string(path).expect("results can be read");
     let result = |line: &str| {
-        let mut words = line.split(' ');
-        let name = words
-            .next()
-            .into_iter()
-            .chain(words.next())
-            .collect::<Vec<_>>()
-            .join(" ");
-        (name, words.map(|x| x.parse().expect("a number")).collect())
+        let (kind, rest) = line.split_once(' ').expect("a name");
+        let (number, rest) = rest.split_once(' ').expect("a number of it");
+        let numbers = rest.split(' ').map(|x| x.parse().expect("a number"));
+        (format!("{kind} {number}"), numbers.collect())
     };
     text.lines().map(result).collect()
 }

@@ -106,11 +106,10 @@ impl<S: ClientStream> Connection<S> {
     /// Puts a message of the registry into the outbox.
     fn accept(&mut self, message: ToClient) {
         match message {
-            ToClient::Deliver { topic, frame } => {
-                let now = Instant::now().into_std();
+            ToClient::Deliver { topic, frame, at } => {
                 self.counting_dropped(|outbox| match &topic {
-                    Some(topic) => outbox.push(topic, frame, now),
-                    None => outbox.push_feedback(frame, now),
+                    Some(topic) => outbox.push(topic, frame, at.into_std()),
+                    None => outbox.push_feedback(frame, at.into_std()),
                 });
             }
             ToClient::Respond { frame, service } => {
@@ -142,7 +141,7 @@ impl<S: ClientStream> Connection<S> {
 
     /// Takes the next frames out of the outbox, if all previous ones were written. Returns whether there are frames to
     /// write. Nothing is held back from a client whose connection is finishing.
-    fn take_frames(&mut self) -> bool {
+    fn take_frames(&mut self, now: Instant) -> bool {
         if self.outbox.is_writing() {
             return true;
         }
@@ -150,7 +149,6 @@ impl<S: ClientStream> Connection<S> {
         if self.outbox.is_empty() && !holds_back {
             return false;
         }
-        let now = Instant::now();
         let room = if self.is_finishing {
             usize::MAX
         } else if has_topics || holds_back {
@@ -168,22 +166,21 @@ impl<S: ClientStream> Connection<S> {
         self.outbox.is_writing()
     }
 
-    /// Notes that `bytes` of the frames were written. Returns whether that allows the client to be read again.
-    fn note_written(&mut self, bytes: usize) -> bool {
-        let may_read = self.may_read();
-        self.progress = Instant::now();
-        self.flow.note_written(bytes, self.progress.into_std());
-        let before = self.outbox.short_bytes();
+    /// Notes that `bytes` of the frames were written.
+    fn note_written(&mut self, bytes: usize, now: Instant) {
+        self.progress = now;
+        self.flow.note_written(bytes, now.into_std());
+        let (responses, short) = (self.outbox.response_bytes(), self.outbox.short_bytes());
         self.outbox.note_written(bytes);
-        let written = before - self.outbox.short_bytes();
-        if written > 0 {
-            self.backlog.fetch_sub(written, Ordering::Relaxed);
+        if self.outbox.response_bytes() == responses {
+            return;
         }
+        let written = short - self.outbox.short_bytes();
+        self.backlog.fetch_sub(written, Ordering::Relaxed);
         if self.outbox.response_bytes() == 0 {
             self.responses_since = None;
         }
         self.start_computation();
-        !may_read && self.may_read()
     }
 
     /// Whether the reader may go on: neither too many responses nor too many computations wait, or it is to end.
@@ -228,55 +225,52 @@ pub(super) struct ClientWriter {
 }
 
 impl<S: ClientStream> ActorFuture<Connection<S>> for ClientWriter {
-    /// Whether all messages were written.
-    type Output = bool;
+    type Output = ();
 
     /// Writes the queued messages, until the connection has finished, its client is gone or has stalled for too long.
     fn poll(
         mut self: Pin<&mut Self>,
         client: &mut Connection<S>,
-        _: &mut Context<Connection<S>>,
+        ctx: &mut Context<Connection<S>>,
         cx: &mut task::Context<'_>,
-    ) -> Poll<bool> {
+    ) -> Poll<()> {
         let mut written = 0;
+        let now = Instant::now();
         loop {
             let is_done = client.is_finishing && client.computations.is_empty();
-            let has_frames = client.take_frames();
+            let has_frames = client.take_frames(now);
             let Some(transport) = &mut client.transport else {
-                return Poll::Ready(false);
+                return client.end_writer(false, ctx);
             };
             let (deadline, release) = if has_frames {
                 match transport.poll_write(cx, client.outbox.writing()) {
                     Poll::Ready(Ok(bytes)) => {
-                        // After many bytes, other connections have a turn. The reader may continue.
-                        let may_read = client.note_written(bytes);
+                        client.note_written(bytes, now);
                         written += bytes;
+                        // After many bytes, other connections have a turn, and the reader may continue.
                         if written >= WRITE_BYTES / 2 {
                             return end_turn(cx);
                         }
-                        if may_read {
-                            cx.waker().wake_by_ref();
-                        }
                         continue;
                     }
-                    Poll::Ready(Err(_)) => return Poll::Ready(false),
+                    Poll::Ready(Err(_)) => return client.end_writer(false, ctx),
                     Poll::Pending => {}
                 }
                 (client.stall_deadline(), None)
             } else if is_done {
-                return self.poll_end(client, cx);
+                return self.poll_end(client, ctx, cx);
             } else {
                 let is_gone = matches!(transport.poll_flush(cx), Poll::Ready(Err(_)));
                 // It has read nothing for too long while a long message waits.
                 let is_stuck = client.flow.age() > STALL_LIMIT && client.outbox.has_long();
                 if is_gone || is_stuck {
-                    return Poll::Ready(false);
+                    return client.end_writer(false, ctx);
                 }
                 (None, client.next_release())
             };
             ready!(self.timer.poll(deadline.or(release), cx));
             if deadline.is_some() {
-                return Poll::Ready(false);
+                return client.end_writer(false, ctx);
             }
         }
     }

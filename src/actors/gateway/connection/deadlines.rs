@@ -3,11 +3,10 @@
 //! **Invariant:** the waits for the rest of a frame, for a client that reads nothing, and for the end of its stream
 //! have deadlines.
 
-use std::pin::Pin;
 use std::sync::atomic::Ordering;
 use std::task::{self, Poll, ready};
 
-use actix::prelude::*;
+use actix::Context;
 use bytes::{Bytes, BytesMut};
 use tokio::time::{Instant, timeout};
 
@@ -16,7 +15,8 @@ use super::reader::{ClientReader, ReadStep, effect};
 use super::transport::{ClientLost, ClientStream};
 use crate::actors::compute::computations::Computations;
 use crate::actors::gateway::limits::{
-    DISCARD_BYTES, FRAME_TIME, LINGER, LOOK_AGAIN, READ_BYTES, RESPONSES_TIME, STALL_LIMIT,
+    DISCARD_BYTES, DISCARD_TIME, FRAME_TIME, LINGER, LOOK_AGAIN, READ_BYTES, RESPONSES_TIME,
+    STALL_LIMIT,
 };
 use crate::actors::gateway::registry::Retire;
 use crate::actors::resources::turns::end_turn;
@@ -97,6 +97,14 @@ impl ClientReader {
         Poll::Ready(Ok(()))
     }
 
+    /// The reader of a client that is not served any more.
+    pub(super) fn discarding<S: ClientStream>(client: &mut Connection<S>) -> Self {
+        client.leave();
+        let mut reader = Self::default();
+        reader.step = ReadStep::Discarding(0, Instant::now() + DISCARD_TIME);
+        reader
+    }
+
     /// Withdraws the client's registrations, because it can no longer answer calls.
     pub(super) fn retire<S: ClientStream>(&self, client: &Connection<S>) -> ReadStep {
         let retired = client.registry.send(Retire(self.id));
@@ -148,37 +156,25 @@ impl<S: ClientStream> Connection<S> {
         self.push_response(status, &[]);
     }
 
-    /// The client sends nothing more. Its output remains to be written, but it no longer waits for computations.
+    /// The client is not served any more. Its output remains to be written, but it no longer waits for computations.
     pub(super) fn leave(&mut self) {
         self.computations = Computations::default();
         self.gone.store(true, Ordering::Relaxed);
         self.is_finishing = true;
     }
-}
 
-// ---- the end --------------------------------------------------------------------------------------------------------
-
-/// Reads and discards the input of a client, up to a limit, if it is refused.
-#[derive(Default)]
-pub(super) struct Discarder {
-    bytes: usize,
-}
-
-impl<S: ClientStream> ActorFuture<Connection<S>> for Discarder {
-    type Output = ();
-
-    fn poll(
-        mut self: Pin<&mut Self>,
-        client: &mut Connection<S>,
-        _: &mut Context<Connection<S>>,
+    /// Reads and discards the input of a client, up to a limit, if it is refused. `bytes` were discarded before.
+    pub(super) fn poll_discard(
+        &mut self,
+        bytes: &mut usize,
         cx: &mut task::Context<'_>,
     ) -> Poll<()> {
-        let Some(transport) = client.transport.as_mut().filter(|_| client.is_refused) else {
+        let Some(transport) = self.transport.as_mut().filter(|_| self.is_refused) else {
             return Poll::Ready(());
         };
         let read = ready!(transport.poll_read(cx, &mut BytesMut::new()));
-        self.bytes += read.unwrap_or(0);
-        if read.unwrap_or(0) == 0 || self.bytes >= DISCARD_BYTES {
+        *bytes += read.unwrap_or(0);
+        if read.unwrap_or(0) == 0 || *bytes >= DISCARD_BYTES {
             return Poll::Ready(());
         }
         end_turn(cx)
@@ -190,15 +186,17 @@ impl ClientWriter {
     pub(super) fn poll_end<S: ClientStream>(
         &mut self,
         client: &mut Connection<S>,
+        ctx: &mut Context<Connection<S>>,
         cx: &mut task::Context<'_>,
-    ) -> Poll<bool> {
+    ) -> Poll<()> {
         let is_refused = client.is_refused;
         if let Some(transport) = &mut client.transport
             && let Poll::Ready(ended) = transport.poll_end(cx, is_refused)
         {
-            return Poll::Ready(ended.is_ok());
+            return client.end_writer(ended.is_ok(), ctx);
         }
         let due = *self.end_due.get_or_insert_with(|| Instant::now() + LINGER);
-        self.timer.poll(Some(due), cx).map(|()| false)
+        ready!(self.timer.poll(Some(due), cx));
+        client.end_writer(false, ctx)
     }
 }

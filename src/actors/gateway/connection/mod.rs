@@ -22,10 +22,10 @@ mod session;
 mod transport;
 mod websocket;
 
-use std::future::ready;
 use std::mem::replace;
 use std::pin::Pin;
 use std::sync::Arc;
+use std::task::{self, Poll};
 
 use actix::fut::wrap_future;
 use actix::prelude::*;
@@ -33,13 +33,12 @@ use actix::prelude::*;
 use self::admission::Admission;
 use self::client::ClientWriter;
 pub use self::client::Connection;
-use self::deadlines::Discarder;
 use self::reader::ClientReader;
 use self::session::{ClientSession, Opened};
 pub use self::transport::ClientStream;
-use super::limits::{DISCARD_TIME, LINGER};
+use super::limits::LINGER;
 use super::registry::{Outlets, Registry};
-use crate::actors::panics::{Contained, contained};
+use crate::actors::panics::{Contained, contain};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::unread;
 pub use crate::actors::resources::unread::Ends;
@@ -77,12 +76,12 @@ impl<S: ClientStream> Connection<S> {
                 ends,
                 outlets,
             };
-            let opening = wrap_future(session.run(stream));
+            let opening = wrap_future(Box::pin(session.run(stream)));
             let opening = opening.map(|opened, connection: &mut Self, ctx| match opened {
                 Some(opened) => connection.converse(opened, ctx),
                 None => ctx.stop(),
             });
-            Self::run("session", opening, ctx);
+            ctx.spawn(Part("session", opening));
             connection
         })
     }
@@ -90,59 +89,64 @@ impl<S: ClientStream> Connection<S> {
     /// Reads and writes until the client disconnects, or has received all its messages.
     fn converse(&mut self, opened: Opened<S>, ctx: &mut Context<Self>) {
         self.transport = Some(opened.transport);
-        let reading: Pin<Box<dyn ActorFuture<Self, Output = ()>>> = match opened.place {
+        let reader = match opened.place {
             Ok(place) => {
                 let reader = ClientReader::new(place.id, opened.first);
                 self.place = Some(place);
-                Box::pin(reader)
+                reader
             }
             Err(status) => {
                 self.refuse_with(status);
-                self.is_finishing = true;
-                Box::pin(wrap_future(ready(())))
+                ClientReader::discarding(self)
             }
         };
-        let reading = reading
-            .then(|(), connection: &mut Self, _| {
-                connection.leave();
-                ActorFutureExt::<Self>::timeout(Discarder::default(), DISCARD_TIME)
-            })
-            .map(|_, connection, ctx| connection.end_half(ctx));
-        Self::run("reader", reading, ctx);
-        let writing = ClientWriter::default().map(|is_all_written, connection: &mut Self, ctx| {
-            if is_all_written && (connection.is_refused || connection.is_socket()) {
-                ctx.run_later(LINGER, |_, ctx| ctx.stop());
-                connection.end_half(ctx);
-            } else {
-                ctx.stop();
-            }
-        });
-        Self::run("writer", writing, ctx);
+        ctx.spawn(Part("reader", reader));
+        ctx.spawn(Part("writer", ClientWriter::default()));
     }
 
     /// Ends the connection if the reader and the writer have ended.
-    fn end_half(&mut self, ctx: &mut Context<Self>) {
+    fn end_half(&mut self, ctx: &mut Context<Self>) -> Poll<()> {
         if replace(&mut self.half_has_ended, true) {
             ctx.stop();
         }
+        Poll::Ready(())
     }
 
-    /// Runs a part of the connection. A panic ends only this connection.
-    fn run(
-        part: &'static str,
-        task: impl ActorFuture<Self, Output = ()> + 'static,
-        ctx: &mut Context<Self>,
-    ) {
-        ctx.spawn(contained(task).map(move |ended, _, ctx| {
-            if let Err(panic) = ended {
-                Self::fail(part, &panic, ctx);
-            }
-        }));
+    /// Ends the writer. The client has time to read the last messages if it is refused, or must send a close frame.
+    fn end_writer(&mut self, is_all_written: bool, ctx: &mut Context<Self>) -> Poll<()> {
+        if is_all_written && (self.is_refused || self.is_socket()) {
+            ctx.run_later(LINGER, |_, ctx| ctx.stop());
+            return self.end_half(ctx);
+        }
+        ctx.stop();
+        Poll::Ready(())
     }
 
     /// Ends the connection after a panic in `part` of it.
     fn fail(part: &str, panic: &Contained, ctx: &mut Context<Self>) {
         tracing::error!(%panic, "a client's {part} failed; its connection ends");
         ctx.stop();
+    }
+}
+
+/// A future of the connection, with its name. A panic in it ends only this connection.
+struct Part<F>(&'static str, F);
+
+impl<S: ClientStream, F: ActorFuture<Connection<S>, Output = ()> + Unpin> ActorFuture<Connection<S>>
+    for Part<F>
+{
+    type Output = ();
+
+    fn poll(
+        mut self: Pin<&mut Self>,
+        connection: &mut Connection<S>,
+        ctx: &mut Context<Connection<S>>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<()> {
+        let future = Pin::new(&mut self.1);
+        contain(|| future.poll(connection, ctx, cx)).unwrap_or_else(|panic| {
+            Connection::fail(self.0, &panic, ctx);
+            Poll::Ready(())
+        })
     }
 }

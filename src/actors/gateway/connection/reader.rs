@@ -37,7 +37,7 @@ type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 /// The reading half of a connection.
 #[derive(Default)]
 pub(super) struct ClientReader {
-    step: ReadStep,
+    pub(super) step: ReadStep,
     pub(super) id: ConnectionId,
     /// Pieces of a message and the memory permit. While a long frame or a piece is read, its future owns them.
     pub(super) long: LongFrames,
@@ -78,6 +78,8 @@ pub(super) enum ReadStep {
     /// The client has stopped sending, but may still read. The reader waits for the answers to its calls and
     /// computations, until the second future ends.
     Retiring(Option<BoxFuture<()>>, BoxFuture<()>),
+    /// The client is not served any more. If it is refused, its input is discarded. The bytes so far, and the deadline.
+    Discarding(usize, Instant),
 }
 
 impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
@@ -87,7 +89,7 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
     fn poll(
         self: Pin<&mut Self>,
         client: &mut Connection<S>,
-        _: &mut Context<Connection<S>>,
+        ctx: &mut Context<Connection<S>>,
         cx: &mut task::Context<'_>,
     ) -> Poll<()> {
         let reader = self.get_mut();
@@ -125,7 +127,14 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
                     if answers.is_some() || !client.computations.is_empty() {
                         ready!(gone.as_mut().poll(cx));
                     }
-                    return Poll::Ready(());
+                    *reader = Self::discarding(client);
+                    continue;
+                }
+                ReadStep::Discarding(bytes, due) => {
+                    if reader.timer.poll(Some(*due), cx).is_pending() {
+                        ready!(client.poll_discard(bytes, cx));
+                    }
+                    return client.end_half(ctx);
                 }
             };
             match next {
@@ -133,7 +142,7 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
                 Err(lost) => {
                     client.is_refused |= lost == ClientLost::Refused;
                     client.registry.do_send(Retire(reader.id));
-                    return Poll::Ready(());
+                    *reader = Self::discarding(client);
                 }
             }
         }

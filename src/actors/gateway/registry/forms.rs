@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 use bytes::Bytes;
+use tokio::time::Instant;
 
 use super::publishing::deliver;
 use super::{Registry, Subscriber};
@@ -72,8 +73,9 @@ impl Registry {
     /// Delivers the messages of a form. Messages that could not be made count as dropped.
     fn deliver_form(&self, subscriber: &Subscriber, made: &Made) {
         self.gauges.add_dropped(made.lost);
+        let now = Instant::now();
         for frame in &made.messages {
-            deliver(subscriber, frame.clone());
+            deliver(subscriber, frame.clone(), now);
         }
     }
 
@@ -88,7 +90,7 @@ impl Registry {
         {
             let plain = messages::respelled(topic.name(), spelling, frame);
             if subscriber.encoding.keeps(plain.len()) {
-                return deliver(subscriber, plain);
+                return deliver(subscriber, plain, Instant::now());
             }
             let message = self.to_encode(subscriber, plain);
             self.deliver_form(subscriber, &message.make());

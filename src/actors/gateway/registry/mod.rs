@@ -22,6 +22,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize};
 use actix::prelude::*;
 use bytes::Bytes;
 use tokio::sync::oneshot;
+use tokio::time::Instant;
 
 pub use self::joining::{Connect, CountRefusal, Disconnect, Retire};
 use crate::actors::ConnectionId;
@@ -263,6 +264,8 @@ pub enum ToClient {
         topic: Option<Arc<str>>,
         /// The message, shared by all subscribers of this form.
         frame: Bytes,
+        /// When it was delivered.
+        at: Instant,
     },
     /// A response, a status, or a call forwarded to this client as a provider. It is never dropped.
     Respond {

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 use bytes::Bytes;
+use tokio::time::Instant;
 
 use super::subscriptions::discard_held;
 use super::{FrameOrigin, Handled, Registry, Subscriber, ToClient};
@@ -89,6 +90,7 @@ impl Registry {
     /// Delivers a message, or a series of messages, to every subscriber of `topic`, an absolute name, in all spellings.
     /// `encode` makes the JSON for a spelling. Returns the long messages that are still to be encoded in other forms.
     fn fan_out(&self, topic: &str, encode: impl Fn(&str) -> Bytes) -> Vec<ToEncode> {
+        let now = Instant::now();
         let mut plain: Vec<(&str, Bytes)> = Vec::new();
         let mut others: Vec<ToEncode> = Vec::new();
         for subscriber in self.topics.subscribers(topic) {
@@ -104,7 +106,7 @@ impl Registry {
             };
             let mut forms = others.iter_mut();
             if encoding.keeps(frame.len()) {
-                deliver(subscriber, frame);
+                deliver(subscriber, frame, now);
             } else if let Some(known) = forms.find(|form| form.suits(subscriber)) {
                 known.recipients.push(Arc::clone(&subscriber.spelling));
             } else if frame.len() > MEDIUM && plain.len() + others.len() >= MAX_LONG_FORMS {
@@ -164,9 +166,8 @@ impl Handler<Publish> for Registry {
 }
 
 /// Sends a frame to the subscriber's connection.
-pub(super) fn deliver(subscriber: &Subscriber, frame: Bytes) {
+pub(super) fn deliver(subscriber: &Subscriber, frame: Bytes, at: Instant) {
     let topic = Some(Arc::clone(&subscriber.spelling));
-    subscriber
-        .mailbox
-        .do_send(ToClient::Deliver { topic, frame });
+    let message = ToClient::Deliver { topic, frame, at };
+    subscriber.mailbox.do_send(message);
 }

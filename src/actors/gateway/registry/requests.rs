@@ -567,10 +567,9 @@ impl Client {
 
     /// Sends feedback of a goal. It may be dropped.
     fn deliver_feedback(&self, frame: Bytes) {
-        let topic = None;
-        self.outlets
-            .mailbox
-            .do_send(ToClient::Deliver { topic, frame });
+        let (topic, at) = (None, Instant::now());
+        let feedback = ToClient::Deliver { topic, frame, at };
+        self.outlets.mailbox.do_send(feedback);
     }
 
     /// Bytes of responses that wait to be written to it.

@@ -46,6 +46,16 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// A scene of one topic.
+    pub const fn new(name: &'static str, traffic: Traffic, subscribers: usize) -> Self {
+        Self {
+            name,
+            topics: 1,
+            subscribers,
+            traffic,
+        }
+    }
+
     /// Whether a server at rest takes about as much processor time as its deliveries.
     pub const fn is_light(&self) -> bool {
         matches!(self.traffic, Traffic::Rate(_)) && self.subscribers <= 10

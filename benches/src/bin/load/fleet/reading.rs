@@ -61,10 +61,7 @@ impl Fleet {
     /// Reads whole events at the front of `bytes`. Returns their number of bytes.
     fn take(&mut self, number: usize, bytes: &[u8]) -> usize {
         let mut taken = 0;
-        while let Some((event, length)) = (taken < bytes.len())
-            .then(|| self.protocol.next(&bytes[taken..]))
-            .flatten()
-        {
+        while let Some((event, length)) = self.protocol.next(&bytes[taken..]) {
             taken += length;
             let link = &mut self.links[number];
             match event {
