@@ -234,8 +234,7 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientWriter {
         ctx: &mut Context<Connection<S>>,
         cx: &mut task::Context<'_>,
     ) -> Poll<()> {
-        let mut written = 0;
-        let now = Instant::now();
+        let (mut written, mut now) = (0, Instant::now());
         loop {
             let is_done = client.is_finishing && client.computations.is_empty();
             let has_frames = client.take_frames(now);
@@ -272,6 +271,7 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientWriter {
             if deadline.is_some() {
                 return client.end_writer(false, ctx);
             }
+            now = Instant::now();
         }
     }
 }
