@@ -48,21 +48,13 @@ pub(crate) fn stability<'py>(
     py: Python<'py>,
     arguments: StabilityArguments<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
-    let StabilityArguments {
-        arm,
-        gains,
-        setpoint,
-        q,
-        qd,
-        ..
-    } = arguments;
     let method = arguments.integrator.method("integrator")?;
     let period = read_period(arguments.control_period)?;
-    for_either!(or_default(arm)?, arm => {
-        let gains = gains::read(gains.as_ref(), Gains::default())?;
-        let setpoint = Setpoint::at(joints_or("setpoint", setpoint.as_ref(), Bound::Finite, [0.0; _])?);
-        let control = ControlLoop::new(arm, gains, setpoint).with_method(method).with_period(period);
-        let start = read_state(("q", q.as_ref()), ("qd", qd.as_ref()))?;
+    for_either!(or_default(arguments.arm)?, arm => {
+        let gains = gains::read(arguments.gains.as_ref(), Gains::default())?;
+        let setpoint = joints_or("setpoint", arguments.setpoint.as_ref(), Bound::Finite, [0.0; _])?;
+        let control = ControlLoop::new(arm, gains, Setpoint::at(setpoint)).with_method(method).with_period(period);
+        let start = read_state(("q", arguments.q.as_ref()), ("qd", arguments.qd.as_ref()))?;
         let motion = Motion::ahead(&control, &start);
         let mut search = Paused::new(search_limits(control));
         let limits = until_done(py, || search.advance())?;
@@ -152,27 +144,19 @@ pub(crate) fn rollout<'py>(
     py: Python<'py>,
     arguments: RolloutArguments<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
-    let RolloutArguments {
-        arm,
-        q0,
-        qdot0,
-        gains,
-        setpoint,
-        ..
-    } = arguments;
     let duration = arguments.duration.read("duration")?;
     let timestep = arguments.timestep.read("timestep")?;
     let samples = arguments.samples.read("samples")?;
     let reference = arguments.reference.read("reference")?;
     let period = read_period(arguments.control_period)?;
     let method = arguments.integrator.method("integrator")?;
-    for_either!(or_default(arm)?, arm => {
+    for_either!(or_default(arguments.arm)?, arm => {
         run(py, RolloutRequest {
-            control: read_loop(arm, gains.as_ref(), setpoint.as_ref())?
+            control: read_loop(arm, arguments.gains.as_ref(), arguments.setpoint.as_ref())?
                 .with_method(method)
                 .with_timestep(timestep)
                 .with_period(period),
-            start: read_state(("q0", q0.as_ref()), ("qdot0", qdot0.as_ref()))?,
+            start: read_state(("q0", arguments.q0.as_ref()), ("qdot0", arguments.qdot0.as_ref()))?,
             duration,
             samples,
             reference,
@@ -302,24 +286,15 @@ pub(crate) fn plan<'py>(
     py: Python<'py>,
     arguments: PlanArguments<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
-    let PlanArguments {
-        arm,
-        duration,
-        q0,
-        qdot0,
-        gains,
-        setpoint,
-        ..
-    } = arguments;
     let error = fields::number("error", arguments.error, Bound::Positive)?;
     let period = read_period(arguments.control_period)?;
-    for_either!(or_default(arm)?, arm => {
-        let control = read_loop(arm, gains.as_ref(), setpoint.as_ref())?.with_period(period);
+    for_either!(or_default(arguments.arm)?, arm => {
+        let control = read_loop(arm, arguments.gains.as_ref(), arguments.setpoint.as_ref())?.with_period(period);
         let usual = if control.is_free() { 10.0 } else { 4.0 };
         let mut planning = Paused::new(planner::plan(Task {
             control,
-            start: read_state(("q0", q0.as_ref()), ("qdot0", qdot0.as_ref()))?,
-            duration: fields::number("duration", duration.unwrap_or(Real::Is(usual)), Bound::Positive)?,
+            start: read_state(("q0", arguments.q0.as_ref()), ("qdot0", arguments.qdot0.as_ref()))?,
+            duration: fields::number("duration", arguments.duration.unwrap_or(Real::Is(usual)), Bound::Positive)?,
             error,
         }));
         let planned = until_done(py, || planning.advance())?.map_err(refused)?;
