@@ -19,7 +19,7 @@ use crate::signals::EndRequests;
 
 /// The refusal of a value in several arguments.
 pub(crate) const UNQUOTED: &str = "\
-    an argument in YAML or JSON came as several words: put quotes around all of it, such as '{data: true}'";
+    an argument in YAML or JSON came as several words: put quotes around all of it, such as '{data: true}'; a TYPE is pkg/Name";
 
 /// Fields of ROS 1 that the runtime also reads, each with its field of ROS 2.
 const ROS_1: [(&str, &str); 3] = [("secs", "sec"), ("nsecs", "nanosec"), ("seq", "stamp")];

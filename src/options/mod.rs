@@ -104,7 +104,7 @@ pub struct Options {
     /// Origins of pages that may show the page and the report in a frame, separated by commas
     #[cfg(feature = "web")]
     #[arg(long, env = "ARM_SIM_ALLOW_FRAME", value_name = "ORIGINS")]
-    #[arg(value_delimiter = ',', value_parser = ValueReader(read_frame))]
+    #[arg(value_delimiter = ',', value_parser = ValueReader(read_frame), conflicts_with = "token")]
     pub allow_frame: Vec<Box<str>>,
     /// Folder of the report at /report/
     #[cfg(feature = "web")]

@@ -64,7 +64,11 @@ pub(crate) fn read_origin(text: &str) -> Result<Box<str>, String> {
         None => origin == "null",
     };
     let needs = "origins, such as https://example.org, null or file://, separated by commas";
-    needed(is_origin.then(|| origin.into()), needs, text)
+    // A browser leaves out the default port.
+    let usual = [("http://", ":80"), ("https://", ":443")].into_iter();
+    let mut usual = usual.filter(|(scheme, _)| origin.starts_with(scheme));
+    let bare = usual.find_map(|(_, port)| origin.strip_suffix(port));
+    needed(is_origin.then(|| bare.unwrap_or(&origin).into()), needs, text)
 }
 
 /// Why a request is refused, and the connection closed.

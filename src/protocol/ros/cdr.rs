@@ -1,7 +1,7 @@
 //! Messages in the encoding of ROS 2: CDR, little-endian, converted from JSON by their type.
 //!
-//! A field that is absent or of another type becomes zero, and so does a whole number that does not fit. A number that
-//! is `null` becomes NaN.
+//! A field that is absent or of another type becomes zero, and so does a whole number that does not fit. But a float of
+//! another type becomes NaN, also if it is `null`: a zero would be a valid value.
 //!
 //! **Invariant:** the offset of every primitive is a multiple of its size, counted from the end of the 4-byte
 //! header.
@@ -86,10 +86,7 @@ impl Sink {
         if self.is_over() {
             return;
         }
-        let float = || match value.map(RawValue::get) {
-            Some("null") => f64::NAN,
-            _ => value.and_then(json::number).unwrap_or_default(),
-        };
+        let float = || value.map_or(0.0, |value| json::number(value).unwrap_or(f64::NAN));
         match kind {
             "bool" => self.aligned([u8::from(value.and_then(json::boolean) == Some(true))]),
             "byte" | "uint8" | "char" => self.aligned(whole::<u8>(value).to_le_bytes()),
@@ -177,15 +174,15 @@ mod tests {
     }
 
     #[test]
-    fn an_absent_or_mistyped_member_is_zero() {
+    fn an_absent_or_mistyped_member_is_zero_but_a_mistyped_float_is_not_a_number() {
         let one = types::find("std_msgs/msg/Header").unwrap();
         let zeros = [0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0];
         assert_eq!(encode(one, &json!({})), zeros);
         assert_eq!(encode(one, &json!({"stamp": 5, "frame_id": []})), zeros);
         assert_eq!(encode(one, &json!("no message")), zeros);
         let one = types::find("geometry_msgs/msg/Vector3").unwrap();
-        let expected = [&HEADER[..], &[0; 24]].concat();
-        assert_eq!(encode(one, &json!({"x": "far"})), expected);
-        assert_eq!(encode(one, &json!(null)), expected);
+        let expected = |x: f64| [&HEADER[..], &x.to_le_bytes(), &[0; 16]].concat();
+        assert_eq!(encode(one, &json!({"x": "far"})), expected(f64::NAN));
+        assert_eq!(encode(one, &json!(null)), expected(0.0));
     }
 }

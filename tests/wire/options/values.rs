@@ -116,6 +116,8 @@ fn other_values_are_refused_by_name_and_value() {
     }
     let long = refusal(&[&format!("--token={}", "s".repeat(257))]);
     assert_eq!(long, "--token must have 16 to 256 characters, got 257");
+    #[cfg(feature = "web")]
+    assert!(refusal(&["--token=0123456789abcdef", "--allow-frame=https://a"]).contains("--token"));
 }
 
 #[test]
