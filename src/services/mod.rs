@@ -4,6 +4,22 @@
 //! **Invariant:** these are plain values, without actors, sockets or clocks. A response has the service's name and the
 //! `id` as the caller spelled them.
 
+/// An object for a message, with its members in this order.
+macro_rules! object {
+    ($($member:ident: $value:expr),* $(,)?) => {{
+        #[allow(non_camel_case_types, reason = "the type of a member has the member's name")]
+        mod object {
+            #[derive(serde::Serialize)]
+            pub(super) struct Object<$($member),*> {
+                $(pub(super) $member: $member,)*
+            }
+        }
+        object::Object {
+            $($member: $value,)*
+        }
+    }};
+}
+
 pub mod arm;
 pub mod goals;
 pub mod study;

@@ -3,7 +3,6 @@
 //! **Invariant:** a refused disturbance does not change the arm.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::{Address, Answered, Ask, FieldByField};
@@ -49,15 +48,11 @@ impl<const N: usize> FieldByField for Disturb<N> {
 
 impl<const N: usize> Answered for Disturb<N> {
     fn write(answer: Result<Push<N>, Rejections>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values<'a> {
-            effort: &'a [f64],
-            duration: f64,
-        }
-        let values = answer.as_ref().map(|push| Values {
-            effort: &push.effort,
-            duration: push.duration,
-        });
-        to.outcome(values)
+        to.outcome(answer.as_ref().map(|push| {
+            object! {
+                effort: push.effort.as_slice(),
+                duration: push.duration,
+            }
+        }))
     }
 }

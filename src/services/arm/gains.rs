@@ -3,7 +3,6 @@
 //! **Invariant:** gains that are not given do not change.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::math::pid::Gains;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
@@ -51,13 +50,11 @@ impl<const N: usize> FieldByField for SetGains<N> {
 
 impl<const N: usize> Answered for SetGains<N> {
     fn write(Echo { values, rejected }: Echo<Gains<N>>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values<'a> {
-            kp: &'a [f64],
-            ki: &'a [f64],
-            kd: &'a [f64],
-        }
-        let Gains { kp, ki, kd } = &values;
-        to.response(&Values { kp, ki, kd }, &rejected.status())
+        let values = object! {
+            kp: values.kp.as_slice(),
+            ki: values.ki.as_slice(),
+            kd: values.kd.as_slice(),
+        };
+        to.response(&values, &rejected.status())
     }
 }

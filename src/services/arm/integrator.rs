@@ -3,7 +3,6 @@
 //! **Invariant:** setting the present values does not change the arm, not even the fraction of a step.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::math::integrator::Method;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
@@ -45,13 +44,10 @@ impl FieldByField for SetIntegrator {
 
 impl Answered for SetIntegrator {
     fn write(Echo { values, rejected }: Echo<Integrator>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values {
-            method: &'static str,
-            timestep: f64,
-        }
-        let Integrator { method, timestep } = values;
-        let method = method.name();
-        to.response(&Values { method, timestep }, &rejected.status())
+        let values = object! {
+            method: values.method.name(),
+            timestep: values.timestep,
+        };
+        to.response(&values, &rejected.status())
     }
 }

@@ -3,7 +3,6 @@
 //! **Invariant:** setting the present values does not change the arm, not even the step in its period.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::math::simulation::ControlPeriod;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
@@ -45,17 +44,10 @@ impl FieldByField for SetPeriod {
 
 impl Answered for SetPeriod {
     fn write(Echo { values, rejected }: Echo<PeriodInForce>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values {
-            period: f64,
-            effective_period: f64,
-            delay: bool,
-        }
-        let ControlPeriod { period, delay } = values.period;
-        let values = Values {
-            period,
+        let values = object! {
+            period: values.period.period,
             effective_period: values.effective,
-            delay,
+            delay: values.period.delay,
         };
         to.response(&values, &rejected.status())
     }

@@ -3,7 +3,6 @@
 //! **Invariant:** the result of a goal that it ends is published before the answer.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::math::arm::State;
 use crate::protocol::op::fields::{Fields, Rejections};
@@ -36,11 +35,9 @@ impl<const N: usize> Answered for Reset<N> {
 
 /// Writes the present state of the arm.
 pub(super) fn write_state<const N: usize>(echo: &Echo<State<N>>, to: &Address) -> Bytes {
-    #[derive(Serialize)]
-    struct Values<'a> {
-        position: &'a [f64],
-        velocity: &'a [f64],
-    }
-    let State { position, velocity } = &echo.values;
-    to.response(&Values { position, velocity }, &echo.rejected.status())
+    let values = object! {
+        position: echo.values.position.as_slice(),
+        velocity: echo.values.velocity.as_slice(),
+    };
+    to.response(&values, &echo.rejected.status())
 }

@@ -3,7 +3,6 @@
 //! **Invariant:** the arm is replaced as a whole, or not at all.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::math::arm::{Arm, ArmError};
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
@@ -53,16 +52,10 @@ impl<const N: usize> FieldByField for SetParams<N> {
 
 impl<const N: usize> Answered for SetParams<N> {
     fn write(Echo { values, rejected }: Echo<Arm<N>>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values<'a> {
-            gravity: f64,
-            masses: &'a [f64],
-            lengths: &'a [f64],
-        }
-        let values = Values {
+        let values = object! {
             gravity: values.gravity(),
-            masses: values.masses(),
-            lengths: values.lengths(),
+            masses: values.masses().as_slice(),
+            lengths: values.lengths().as_slice(),
         };
         to.response(&values, &rejected.status())
     }

@@ -7,7 +7,6 @@
 //! or the runtime ends.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::math::arm::State;
 use crate::protocol::messages::Empty;
@@ -73,14 +72,6 @@ impl<const N: usize> FieldByField for Step<N> {
 
 impl<const N: usize> Answered for Step<N> {
     fn write(answer: Result<Stepped<N>, Rejections>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values<'a> {
-            steps: u64,
-            time: f64,
-            position: &'a [f64],
-            velocity: &'a [f64],
-            effort: &'a [f64],
-        }
         match answer {
             Ok(stepped) => {
                 let status = match stepped.end {
@@ -88,12 +79,12 @@ impl<const N: usize> Answered for Step<N> {
                     StepsEnd::Diverged => "steps ended early: the simulation has diverged",
                     StepsEnd::Resumed => "steps ended early: the arm has been resumed",
                 };
-                let values = Values {
+                let values = object! {
                     steps: stepped.steps,
                     time: stepped.time,
-                    position: &stepped.state.position,
-                    velocity: &stepped.state.velocity,
-                    effort: &stepped.effort,
+                    position: stepped.state.position.as_slice(),
+                    velocity: stepped.state.velocity.as_slice(),
+                    effort: stepped.effort.as_slice(),
                 };
                 to.response(&values, status)
             }

@@ -4,19 +4,12 @@
 //! ends.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::protocol::op::fields::{Fields, Rejections};
 use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
-#[derive(Serialize)]
-struct Switch {
-    data: bool,
-}
-
 fn write_switch(echo: &Echo<bool>, to: &Address) -> Bytes {
-    let data = echo.values;
-    to.response(&Switch { data }, &echo.rejected.status())
+    to.response(&object! { data: echo.values }, &echo.rejected.status())
 }
 
 /// Freezes or resumes simulation time. The answer is whether it is frozen.

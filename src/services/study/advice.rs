@@ -3,7 +3,6 @@
 //! **Invariant:** every returned answer was simulated, and the live arm does not change.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use super::{Computed, Present, Refused, StudyWork, arm_of, with_period};
 use crate::math::arm::{ArmError, State};
@@ -108,24 +107,16 @@ impl<const N: usize> Callable for SuggestGains<N> {
 
 impl<const N: usize> Answered for SuggestGains<N> {
     fn write(answer: Self::Answer, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values {
-            kp: Vec<f64>,
-            ki: Vec<f64>,
-            kd: Vec<f64>,
-            timestep_limit: Option<f64>,
-            certified: bool,
-            margin: Option<f64>,
-            settled_after: f64,
-        }
-        to.outcome(answer.map(|Suggested { found, timestep }| Values {
-            kp: found.gains.kp.to_vec(),
-            ki: found.gains.ki.to_vec(),
-            kd: found.gains.kd.to_vec(),
-            timestep_limit: found.limit,
-            certified: found.certified,
-            margin: found.limit.map(|limit| limit / timestep),
-            settled_after: found.settled_after,
+        to.outcome(answer.as_ref().map(|Suggested { found, timestep }| {
+            object! {
+                kp: found.gains.kp.as_slice(),
+                ki: found.gains.ki.as_slice(),
+                kd: found.gains.kd.as_slice(),
+                timestep_limit: found.limit,
+                certified: found.certified,
+                margin: found.limit.map(|limit| limit / timestep),
+                settled_after: found.settled_after,
+            }
         }))
     }
 }
@@ -151,44 +142,22 @@ impl<const N: usize> Callable for PlanRun<N> {
 
 impl<const N: usize> Answered for PlanRun<N> {
     fn write(answer: Self::Answer, to: &Address) -> Bytes {
-        to.outcome(answer.map(PlanValues::from))
-    }
-}
-
-#[derive(Serialize)]
-struct PlanValues {
-    integrator: &'static str,
-    timestep: f64,
-    control_period: Option<f64>,
-    evaluations_per_second: f64,
-    error: f64,
-    error_uncertainty: f64,
-    methods: Vec<&'static str>,
-    timesteps: Vec<f64>,
-    evaluations: Vec<u64>,
-    errors: Vec<f64>,
-}
-
-impl From<PlannedRun> for PlanValues {
-    fn from(run: PlannedRun) -> Self {
-        let PlannedRun {
-            planned,
-            control_period,
-        } = run;
-        let best = planned.best;
-        let all = || planned.candidates.iter().rev();
-        Self {
-            integrator: best.method.name(),
-            timestep: best.timestep,
-            control_period,
-            evaluations_per_second: f64::from(best.method.evaluations()) / best.timestep,
-            error: best.error,
-            error_uncertainty: planned.uncertainty,
-            methods: all().map(|one| one.method.name()).collect(),
-            timesteps: all().map(|one| one.timestep).collect(),
-            evaluations: all().map(|one| one.evaluations).collect(),
-            errors: all().map(|one| one.error).collect(),
-        }
+        to.outcome(answer.map(|run| {
+            let best = run.planned.best;
+            let all = || run.planned.candidates.iter().rev();
+            object! {
+                integrator: best.method.name(),
+                timestep: best.timestep,
+                control_period: run.control_period,
+                evaluations_per_second: f64::from(best.method.evaluations()) / best.timestep,
+                error: best.error,
+                error_uncertainty: run.planned.uncertainty,
+                methods: all().map(|one| one.method.name()).collect::<Vec<_>>(),
+                timesteps: all().map(|one| one.timestep).collect::<Vec<_>>(),
+                evaluations: all().map(|one| one.evaluations).collect::<Vec<_>>(),
+                errors: all().map(|one| one.error).collect::<Vec<_>>(),
+            }
+        }))
     }
 }
 

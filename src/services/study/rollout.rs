@@ -94,28 +94,13 @@ impl<const N: usize> Callable for RunOffline<N> {
 
 impl<const N: usize> Answered for RunOffline<N> {
     fn write(answer: RunAnswer<N>, to: &Address) -> Bytes {
-        /// The samples and the error, in the order of the documentation.
-        #[derive(Serialize)]
-        struct Values<'a, const N: usize> {
-            times: &'a [f64],
-            positions: Rows<'a, N>,
-            velocities: Rows<'a, N>,
-            efforts: Rows<'a, N>,
-            energy: &'a [f64],
-            evaluations: u64,
-            wall_time: f64,
-            error: Option<f64>,
-            error_uncertainty: Option<f64>,
-            sampling_error: Option<f64>,
-            sampling_error_uncertainty: Option<f64>,
-        }
         let Ran { run, took } = match answer {
             Ok(ran) => *ran,
             Err(why) => return to.failure(&why.to_string()),
         };
         let method = run.known(run.deviation.as_ref());
         let sampling = run.known(run.from_ideal.as_ref());
-        let values = Values {
+        let values = object! {
             times: &run.times,
             positions: Rows(&run.positions),
             velocities: Rows(&run.velocities),
