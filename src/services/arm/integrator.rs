@@ -8,15 +8,14 @@ use crate::math::integrator::Method;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
-/// Sets method and timestep.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SetIntegrator {
-    /// The method that takes the steps.
-    pub method: Option<Method>,
-    /// Length of a step \[s\], greater than 0.
-    pub timestep: Option<f64>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
+request! {
+    /// Sets method and timestep.
+    pub struct SetIntegrator -> Echo<Integrator>, |fields| {
+        /// The method that takes the steps.
+        method: Option<Method> = fields.choice("method", &Method::ALL, Method::name),
+        /// Length of a step \[s\], greater than 0.
+        timestep: Option<f64> = fields.number("timestep", Bound::Positive),
+    }
 }
 
 /// The present method and timestep.
@@ -26,20 +25,6 @@ pub struct Integrator {
     pub method: Method,
     /// Length of a step \[s\].
     pub timestep: f64,
-}
-
-impl Ask for SetIntegrator {
-    type Answer = Echo<Integrator>;
-}
-
-impl FieldByField for SetIntegrator {
-    fn from_fields(fields: &mut Fields<'_>) -> Self {
-        Self {
-            method: fields.choice("method", &Method::ALL, Method::name),
-            timestep: fields.number("timestep", Bound::Positive),
-            rejected: fields.rejections(),
-        }
-    }
 }
 
 impl Answered for SetIntegrator {

@@ -8,15 +8,14 @@ use crate::math::simulation::ControlPeriod;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
-/// Sets the time between two runs of the control law.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SetPeriod {
-    /// That time \[s\], not negative; 0 for every step.
-    pub period: Option<f64>,
-    /// Whether an effort is applied one period after its state was read.
-    pub delay: Option<bool>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
+request! {
+    /// Sets the time between two runs of the control law.
+    pub struct SetPeriod -> Echo<PeriodInForce>, |fields| {
+        /// That time \[s\], not negative; 0 for every step.
+        period: Option<f64> = fields.number("period", Bound::NonNegative),
+        /// Whether an effort is applied one period after its state was read.
+        delay: Option<bool> = fields.boolean("delay"),
+    }
 }
 
 /// The present control period.
@@ -26,20 +25,6 @@ pub struct PeriodInForce {
     pub period: ControlPeriod,
     /// The effective period, a whole number of timesteps \[s\].
     pub effective: f64,
-}
-
-impl Ask for SetPeriod {
-    type Answer = Echo<PeriodInForce>;
-}
-
-impl FieldByField for SetPeriod {
-    fn from_fields(fields: &mut Fields<'_>) -> Self {
-        Self {
-            period: fields.number("period", Bound::NonNegative),
-            delay: fields.boolean("delay"),
-            rejected: fields.rejections(),
-        }
-    }
 }
 
 impl Answered for SetPeriod {

@@ -8,23 +8,10 @@ use crate::math::arm::State;
 use crate::protocol::op::fields::{Fields, Rejections};
 use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
-/// Returns the arm to its starting pose at time 0, unless the request was rejected.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Reset<const N: usize> {
-    /// A reset has no fields: the request is rejected as a whole.
-    pub rejected: Rejections,
-}
-
-impl<const N: usize> Ask for Reset<N> {
-    type Answer = Echo<State<N>>;
-}
-
-impl<const N: usize> FieldByField for Reset<N> {
-    fn from_fields(fields: &mut Fields<'_>) -> Self {
-        Self {
-            rejected: fields.rejections(),
-        }
-    }
+request! {
+    /// Returns the arm to its starting pose at time 0, unless the request was rejected. It has no fields, so it is
+    /// rejected as a whole.
+    pub struct Reset<N> -> Echo<State<N>>, |fields| {}
 }
 
 impl<const N: usize> Answered for Reset<N> {

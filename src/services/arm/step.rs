@@ -19,15 +19,14 @@ pub const MAX_STEPS: u64 = 10_000;
 /// Steps per turn: about 0.2 ms of work, so neither the tick nor another client's call waits long.
 pub const STEPS_IN_A_ROW: u64 = 1000;
 
-/// Takes steps while paused. Refused if a field was rejected, or if the arm cannot be stepped.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Step<const N: usize> {
-    /// The number of steps, 1 to [`MAX_STEPS`].
-    pub steps: Option<u64>,
-    /// The effort in these steps \[N m\], in place of the controller's; `None` for the controller's.
-    pub effort: Option<[f64; N]>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
+request! {
+    /// Takes steps while paused. Refused if a field was rejected, or if the arm cannot be stepped.
+    pub struct Step<N> -> Result<Stepped<N>, Rejections>, |fields| {
+        /// The number of steps, 1 to [`MAX_STEPS`].
+        steps: Option<u64> = fields.count("steps", 1..=MAX_STEPS),
+        /// The effort in these steps \[N m\], in place of the controller's; `None` for the controller's.
+        effort: Option<[f64; N]> = fields.array("effort", Bound::Finite),
+    }
 }
 
 /// The taken steps.
@@ -54,20 +53,6 @@ pub enum StepsEnd {
     Diverged,
     /// The arm has been resumed.
     Resumed,
-}
-
-impl<const N: usize> Ask for Step<N> {
-    type Answer = Result<Stepped<N>, Rejections>;
-}
-
-impl<const N: usize> FieldByField for Step<N> {
-    fn from_fields(fields: &mut Fields<'_>) -> Self {
-        Self {
-            steps: fields.count("steps", 1..=MAX_STEPS),
-            effort: fields.array("effort", Bound::Finite),
-            rejected: fields.rejections(),
-        }
-    }
 }
 
 impl<const N: usize> Answered for Step<N> {

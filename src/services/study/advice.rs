@@ -16,9 +16,7 @@ use crate::services::arm::{SetGains, SetParams};
 use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::gains::{GainsError, GainsRequirements, SuggestedGains, search_gains};
-use crate::study::paused::Paused;
 use crate::study::planner::{PlanError, Planned, Task, plan};
-use crate::study::stability::most_bytes;
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -50,31 +48,31 @@ pub struct Suggested<const N: usize> {
     pub timestep: f64,
 }
 
-/// Searches the cheapest method and timestep that keep a run within an error.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PlanRun<const N: usize> {
-    /// The allowed error of the end effector \[m\], greater than 0.
-    pub error: f64,
-    /// The duration of the run \[s\], greater than 0.
-    pub duration: Option<f64>,
-    /// Whether the present gains apply if the request has none.
-    pub controller: bool,
-    /// Initial positions \[rad\].
-    pub q0: Option<[f64; N]>,
-    /// Initial velocities \[rad/s\].
-    pub qdot0: Option<[f64; N]>,
-    /// Changed parameters of the arm.
-    pub params: Option<SetParams<N>>,
-    /// Changed gains.
-    pub gains: Option<SetGains<N>>,
-    /// The setpoint \[rad\], at rest.
-    pub setpoint: Option<[f64; N]>,
-    /// The control period \[s\]; `None` or 0 to plan it.
-    pub control_period: Option<f64>,
-}
-
-impl<const N: usize> Ask for PlanRun<N> {
-    type Answer = Result<PlannedRun, Refused<PlanError>>;
+request! {
+    whole
+    /// Searches the cheapest method and timestep that keep a run within an error.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct PlanRun<N> -> Result<PlannedRun, Refused<PlanError>>, |fields| {
+        /// The allowed error of the end effector \[m\], greater than 0. The catalog requires it: without it the request
+        /// is rejected.
+        error: f64 = fields.number("error", Bound::Positive).unwrap_or(f64::NAN),
+        /// The duration of the run \[s\], greater than 0.
+        duration: Option<f64> = fields.number("duration", Bound::Positive),
+        /// Whether the present gains apply if the request has none.
+        controller: bool = fields.boolean("controller").unwrap_or(false),
+        /// Initial positions \[rad\].
+        q0: Option<[f64; N]> = fields.array("q0", Bound::Finite),
+        /// Initial velocities \[rad/s\].
+        qdot0: Option<[f64; N]> = fields.array("qdot0", Bound::Finite),
+        /// Changed parameters of the arm.
+        params: Option<SetParams<N>> = fields.object("params", SetParams::from_fields),
+        /// Changed gains.
+        gains: Option<SetGains<N>> = fields.object("gains", SetGains::from_fields),
+        /// The setpoint \[rad\], at rest.
+        setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
+        /// The control period \[s\]; `None` or 0 to plan it.
+        control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
+    }
 }
 
 /// A simulated plan.
@@ -121,25 +119,6 @@ impl<const N: usize> Answered for SuggestGains<N> {
     }
 }
 
-impl<const N: usize> Callable for PlanRun<N> {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read(arguments, service)?;
-        let ask = Self {
-            // The catalog requires the field: without it the question is rejected.
-            error: fields.number("error", Bound::Positive).unwrap_or(f64::NAN),
-            duration: fields.number("duration", Bound::Positive),
-            controller: fields.boolean("controller").unwrap_or(false),
-            q0: fields.array("q0", Bound::Finite),
-            qdot0: fields.array("qdot0", Bound::Finite),
-            params: fields.object("params", SetParams::from_fields),
-            gains: fields.object("gains", SetGains::from_fields),
-            setpoint: fields.array("setpoint", Bound::Finite),
-            control_period: fields.number("control_period", Bound::NonNegative),
-        };
-        fields.accept(ask)
-    }
-}
-
 impl<const N: usize> Answered for PlanRun<N> {
     fn write(answer: Self::Answer, to: &Address) -> Bytes {
         to.outcome(answer.map(|run| {
@@ -178,17 +157,13 @@ impl<const N: usize> Computed<N> for SuggestGains<N> {
     type Work = StudyWork<Self::Answer>;
 
     fn work(self, present: Present<N>) -> Self::Work {
-        let computation = Paused::new(async move {
+        StudyWork::new::<N>(async move {
             let (control, requirements) = demands(&self, &present.control)?;
             let found = search_gains(control, requirements).await;
             let found = found.map_err(Refused::Study)?;
             let timestep = control.timestep;
             Ok(Suggested { found, timestep })
-        });
-        StudyWork {
-            most_bytes: most_bytes::<N>(),
-            computation,
-        }
+        })
     }
 }
 
@@ -218,7 +193,7 @@ impl<const N: usize> Computed<N> for PlanRun<N> {
     type Work = StudyWork<Self::Answer>;
 
     fn work(self, present: Present<N>) -> Self::Work {
-        let computation = Paused::new(async move {
+        StudyWork::new::<N>(async move {
             let task = task(&self, &present)?;
             let planned = plan(task).await.map_err(Refused::Study)?;
             let period = task.control.period.period;
@@ -228,11 +203,7 @@ impl<const N: usize> Computed<N> for PlanRun<N> {
                 planned,
                 control_period: (!task.control.is_free()).then_some(period),
             })
-        });
-        StudyWork {
-            most_bytes: most_bytes::<N>(),
-            computation,
-        }
+        })
     }
 }
 

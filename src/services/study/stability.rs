@@ -21,28 +21,26 @@ use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
 use crate::study::motion::{FREE_SECONDS, Motion};
-use crate::study::paused::Paused;
-use crate::study::stability::{Limits, most_bytes, search_limits};
+use crate::study::stability::{Limits, search_limits};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
-/// Predicts the largest stable timesteps of a control loop.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct PredictStability<const N: usize> {
-    /// The method that takes the steps.
-    pub method: Option<Method>,
-    /// Changed gains.
-    pub gains: Option<SetGains<N>>,
-    /// Changed parameters of the arm.
-    pub params: Option<SetParams<N>>,
-    /// The setpoint \[rad\], at rest.
-    pub setpoint: Option<[f64; N]>,
-    /// The time between two runs of the control law \[s\], not negative; 0 for every step.
-    pub control_period: Option<f64>,
-}
-
-impl<const N: usize> Ask for PredictStability<N> {
-    type Answer = Result<Box<Predicted<N>>, ArmError>;
+request! {
+    whole
+    /// Predicts the largest stable timesteps of a control loop.
+    #[derive(Debug, Clone, PartialEq, Default)]
+    pub struct PredictStability<N> -> Result<Box<Predicted<N>>, ArmError>, |fields| {
+        /// The method that takes the steps.
+        method: Option<Method> = fields.choice("integrator", &Method::ALL, Method::name),
+        /// Changed gains.
+        gains: Option<SetGains<N>> = fields.object("gains", SetGains::from_fields),
+        /// Changed parameters of the arm.
+        params: Option<SetParams<N>> = fields.object("params", SetParams::from_fields),
+        /// The setpoint \[rad\], at rest.
+        setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
+        /// The time between two runs of the control law \[s\], not negative; 0 for every step.
+        control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
+    }
 }
 
 /// A prediction.
@@ -58,20 +56,6 @@ pub struct Predicted<const N: usize> {
 }
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
-
-impl<const N: usize> Callable for PredictStability<N> {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read(arguments, service)?;
-        let ask = Self {
-            method: fields.choice("integrator", &Method::ALL, Method::name),
-            gains: fields.object("gains", SetGains::from_fields),
-            params: fields.object("params", SetParams::from_fields),
-            setpoint: fields.array("setpoint", Bound::Finite),
-            control_period: fields.number("control_period", Bound::NonNegative),
-        };
-        fields.accept(ask)
-    }
-}
 
 impl<const N: usize> Answered for PredictStability<N> {
     fn write(answer: Result<Box<Predicted<N>>, ArmError>, to: &Address) -> Bytes {
@@ -119,7 +103,7 @@ impl<const N: usize> Computed<N> for PredictStability<N> {
     type Work = StudyWork<Self::Answer>;
 
     fn work(self, present: Present<N>) -> Self::Work {
-        let computation = Paused::new(async move {
+        StudyWork::new::<N>(async move {
             let control = control_loop(&self, &present.control)?;
             Ok(Box::new(Predicted {
                 motion: Motion::ahead(&control, &present.state),
@@ -127,11 +111,7 @@ impl<const N: usize> Computed<N> for PredictStability<N> {
                 is_free: control.is_free(),
                 limits: search_limits(control).await,
             }))
-        });
-        StudyWork {
-            most_bytes: most_bytes::<N>(),
-            computation,
-        }
+        })
     }
 }
 
