@@ -71,11 +71,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     }
 
     /// Publishes the message of `make`, which is called when the frame is written.
-    pub(super) fn publish<M: Serialize>(
-        &self,
-        topic: Topic,
-        make: impl FnOnce() -> M + Send + 'static,
-    ) {
+    pub fn publish<M: Serialize>(&self, topic: Topic, make: impl FnOnce() -> M + Send + 'static) {
         self.world
             .publish(topic, move || messages::publish(topic.name(), &make()));
     }

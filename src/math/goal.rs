@@ -5,10 +5,8 @@
 //! **Invariant:** "reached" means that no judged step of the last `success_hold` seconds found the end effector farther
 //! than `epsilon` from the target.
 
-use crate::math::elementary::hypot;
-use std::fmt;
-
 use glam::DVec2;
+use libm::hypot;
 
 /// Default of `epsilon` \[m\]: 1 % of the reach of the default arm of two links.
 pub const EPSILON: f64 = 0.02;
@@ -64,12 +62,6 @@ impl Outcome {
             Self::Reached => "reached",
             Self::Preempted => "preempted",
         }
-    }
-}
-
-impl fmt::Display for Outcome {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
     }
 }
 

@@ -1,11 +1,13 @@
 //! The physics and the control of the arm: plain values and pure functions that get the time.
 //!
+//! Kinematics and the study take elementary functions from `libm`. They have the same bits on every platform, unlike
+//! those of the standard library.
+//!
 //! **Invariant:** this module uses no clock, no I/O, no JSON, no threads and no actors.
 
 pub mod arm;
 pub mod count;
 pub mod dynamics;
-pub(crate) mod elementary;
 pub mod expression;
 pub mod goal;
 pub mod integrator;

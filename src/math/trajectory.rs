@@ -101,10 +101,10 @@ impl<const N: usize> JointPath<N> {
         let before = behind.checked_sub(1).and_then(|at| self.points.get(at));
         match (before, self.points.get(behind)) {
             (Some(before), Some(next)) => between(before, next, time),
-            (Some(only), None) | (None, Some(only)) => at_rest(only.position),
+            (Some(only), None) | (None, Some(only)) => Setpoint::at(only.position),
             (None, None) => {
                 debug_assert!(false, "a path has points");
-                at_rest([0.0; N])
+                Setpoint::at([0.0; N])
             }
         }
     }
@@ -119,13 +119,6 @@ impl<const N: usize> JointPath<N> {
             velocity: std::array::from_fn(mean),
             ..now
         }
-    }
-}
-
-fn at_rest<const N: usize>(position: [f64; N]) -> Setpoint<N> {
-    Setpoint {
-        position,
-        velocity: [0.0; N],
     }
 }
 

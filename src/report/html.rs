@@ -94,7 +94,7 @@ fn verdicts(sections: &[Section]) -> String {
         let words = [&verdict.claim, &verdict.seen].map(Cell::new);
         words
             .into_iter()
-            .chain([Cell::verdict(verdict.holds)])
+            .chain([Cell::verdict(Some(verdict.holds))])
             .collect()
     };
     table.rows.extend(all.iter().map(row));

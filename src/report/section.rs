@@ -154,6 +154,15 @@ impl Table {
     }
 }
 
+/// Class and words of a verdict; `None` for a claim that was not tested.
+pub(crate) const fn verdict(holds: Option<bool>) -> (&'static str, &'static str) {
+    match holds {
+        Some(true) => ("good", "holds"),
+        Some(false) => ("bad", "does not hold"),
+        None => ("soft", "not run"),
+    }
+}
+
 /// A cell: its text, a line of detail under it, and a class that colours it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Cell {
@@ -181,12 +190,9 @@ impl Cell {
         Self { class, ..self }
     }
 
-    pub(crate) fn verdict(holds: bool) -> Self {
-        if holds {
-            Self::new("holds").class("good")
-        } else {
-            Self::new("does not hold").class("bad")
-        }
+    pub(crate) fn verdict(holds: Option<bool>) -> Self {
+        let (class, words) = verdict(holds);
+        Self::new(words).class(class)
     }
 
     fn said(&self) -> String {

@@ -189,37 +189,22 @@ impl<const N: usize> AcceptedGoal<N> {
     /// \[s\].
     #[must_use]
     pub fn feedback(&self, distance: f64, elapsed: f64) -> impl Serialize + use<N> {
-        #[derive(Serialize)]
-        struct Feedback {
-            goal_id: String,
-            target: TargetMessage,
-            positions: Vec<f64>,
-            distance_remaining: f64,
-            elapsed: f64,
-        }
-        Feedback {
+        object! {
             goal_id: self.id.clone(),
-            target: (&self.target).into(),
+            target: TargetMessage::from(&self.target),
             positions: self.positions.to_vec(),
             distance_remaining: distance,
-            elapsed,
+            elapsed: elapsed,
         }
     }
 
     /// Its message on `/ik_action/result`.
     #[must_use]
     pub fn result(&self, distance: f64, outcome: Option<Outcome>) -> impl Serialize + use<N> {
-        #[derive(Serialize)]
-        struct GoalResult {
-            goal_id: String,
-            outcome: &'static str,
-            target: TargetMessage,
-            final_distance: f64,
-        }
-        GoalResult {
+        object! {
             goal_id: self.id.clone(),
             outcome: outcome.map_or("", Outcome::name),
-            target: (&self.target).into(),
+            target: TargetMessage::from(&self.target),
             final_distance: distance,
         }
     }

@@ -4,6 +4,73 @@
 //! **Invariant:** these are plain values, without actors, sockets or clocks. A response has the service's name and the
 //! `id` as the caller spelled them.
 
+/// An object for a message, with its members in this order.
+macro_rules! object {
+    ($($member:ident: $value:expr),* $(,)?) => {{
+        #[allow(non_camel_case_types, reason = "the type of a member has the member's name")]
+        mod object {
+            #[derive(serde::Serialize)]
+            pub(super) struct Object<$($member),*> {
+                $(pub(super) $member: $member,)*
+            }
+        }
+        object::Object {
+            $($member: $value,)*
+        }
+    }};
+}
+
+/// A request: its answer, and its fields with the expression that reads each. The fields of a `whole` request are all
+/// valid, or it is rejected. Of the others each field is checked alone, and the request has the rejections.
+macro_rules! request {
+    (whole $(#[$about:meta])* pub struct $request:ident<$n:ident> -> $answer:ty, |$fields:ident| {
+        $($(#[$doc:meta])* $field:ident: $kind:ty = $read:expr,)*
+    }) => {
+        $(#[$about])*
+        pub struct $request<const $n: usize> {
+            $($(#[$doc])* pub $field: $kind,)*
+        }
+
+        impl<const $n: usize> Ask for $request<$n> {
+            type Answer = $answer;
+        }
+
+        impl<const $n: usize> Callable for $request<$n> {
+            fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+                let mut $fields = Fields::read(arguments, service)?;
+                let request = Self {
+                    $($field: $read,)*
+                };
+                $fields.accept(request)
+            }
+        }
+    };
+    ($(#[$about:meta])* pub struct $request:ident$(<$n:ident>)? -> $answer:ty, |$fields:ident| {
+        $($(#[$doc:meta])* $field:ident: $kind:ty = $read:expr,)*
+    }) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, PartialEq, Default)]
+        pub struct $request$(<const $n: usize>)? {
+            $($(#[$doc])* pub $field: $kind,)*
+            /// Fields that were not valid.
+            pub rejected: Rejections,
+        }
+
+        impl$(<const $n: usize>)? Ask for $request$(<$n>)? {
+            type Answer = $answer;
+        }
+
+        impl$(<const $n: usize>)? FieldByField for $request$(<$n>)? {
+            fn from_fields($fields: &mut Fields<'_>) -> Self {
+                Self {
+                    $($field: $read,)*
+                    rejected: $fields.rejections(),
+                }
+            }
+        }
+    };
+}
+
 pub mod arm;
 pub mod goals;
 pub mod study;

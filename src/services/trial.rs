@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use serde::Serialize;
-use serde_json::json;
 
 use super::goals::TargetMessage;
 use super::{Address, Answered, Ask, Callable};
@@ -88,11 +87,11 @@ impl Answered for TrialRequest {
             return to.outcome(outcome.map(|()| Empty {}));
         }
         let Settings { duration, criteria } = settings;
-        let values = json!({
-            "duration": duration,
-            "epsilon": criteria.epsilon,
-            "success_hold": criteria.success_hold,
-        });
+        let values = object! {
+            duration: duration,
+            epsilon: criteria.epsilon,
+            success_hold: criteria.success_hold,
+        };
         let status = outcome.map_or_else(|why| why.to_string(), |()| String::new());
         to.response(&values, &status)
     }
@@ -101,18 +100,7 @@ impl Answered for TrialRequest {
 /// The message of `/ik_trial/status`.
 #[must_use]
 pub fn status_message(status: &Status) -> impl Serialize + use<> {
-    #[derive(Serialize)]
-    struct TrialStatus {
-        running: bool,
-        elapsed: f64,
-        duration: f64,
-        targets_reached: u64,
-        target: Option<TargetMessage>,
-        error: Option<f64>,
-        desired_positions: Option<Vec<f64>>,
-        action_status: &'static str,
-    }
-    TrialStatus {
+    object! {
         running: status.running,
         elapsed: status.elapsed,
         duration: status.duration,

@@ -5,11 +5,12 @@
 
 use std::f64::consts::TAU;
 
+use libm::{atan2, hypot};
+
 use super::control_loop::ControlLoop;
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix};
 use super::stability::{Modes, NEUTRAL, Sampling, Stepping};
-use crate::math::elementary::{atan2, hypot};
 
 /// The loop is analysed at this multiple of its limit, since nothing grows at the limit itself.
 pub const BEYOND: f64 = 1.1;

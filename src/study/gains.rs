@@ -13,6 +13,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use libm::{cbrt, pow};
+
 use super::control_loop::ControlLoop;
 use super::limits;
 use super::matrix::largest;
@@ -20,7 +22,6 @@ use super::paused::PieceWork;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{forward_dynamics, gravity_load, mass_matrix};
-use crate::math::elementary::{cbrt, pow};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use crate::math::shown::{Shown, shown_against};
 use crate::math::simulation::Simulation;

@@ -39,12 +39,13 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use libm::sincos;
+
 use super::control_loop::ControlLoop;
 use super::paused::pause;
 use super::stability::bisect;
 use crate::math::arm::Arm;
 use crate::math::dynamics::{coupling, mass_matrix, weight_moment};
-use crate::math::elementary::sin_cos;
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
 
@@ -204,13 +205,13 @@ impl<const N: usize> Proof<N> {
                 between += middle[j];
                 reach += half[j];
                 let product = coupling(&self.arm, i, j);
-                let (sin, cos) = sin_cos(between);
+                let (sin, cos) = sincos(between);
                 links[i][j] = product * cos;
                 links[j][i] = links[i][j];
                 if reach > 0.0 {
                     let turn: f64 = reach.min(PI);
-                    let lost = cos.abs() * (1.0 - sin_cos(turn).1)
-                        + sin.abs() * sin_cos(turn.min(FRAC_PI_2)).0;
+                    let lost = cos.abs() * (1.0 - sincos(turn).1)
+                        + sin.abs() * sincos(turn.min(FRAC_PI_2)).0;
                     let (one, other) = (coupling(&self.arm, i, i), coupling(&self.arm, j, j));
                     let scale = (one / other).sqrt();
                     links[i][i] -= product * lost.min(2.0) * scale;

@@ -28,7 +28,7 @@ fn a_goal_tells_its_age_and_its_end_by_name() {
         [2.5, 0.0, 0.0],
         "a clock set back makes none negative"
     );
-    let ends = [Outcome::Reached, Outcome::Preempted].map(|end| end.to_string());
+    let ends = [Outcome::Reached, Outcome::Preempted].map(Outcome::name);
     assert_eq!(ends, ["reached", "preempted"]);
 }
 

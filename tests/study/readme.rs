@@ -4,10 +4,8 @@ use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::budget::Budget;
-use pendularm::report::experiments::error::{OUTPUTS, Scene, scenes};
+use pendularm::report::experiments::error::{OUTPUTS, scenes};
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::fewest::fewest;
-use pendularm::study::paused::at_once;
 use pendularm::study::stability::limits;
 
 use crate::planner::{falling, moving, plan};
@@ -25,25 +23,16 @@ fn agrees(paper: &str, before: &str, seen: f64, digits: i32) {
     );
 }
 
-/// The fewest steps within `error`, between `least` and the first run of ever half the timestep that is within it.
-fn fewest_steps(scene: &Scene, method: Method, error: f64, least: u64) -> u64 {
-    let is_enough = |steps| scene.task.run(method, steps, error).error <= error;
-    let mut most = OUTPUTS;
-    while !is_enough(most) {
-        most *= 2;
-    }
-    at_once(fewest(least, most, 256, is_enough)).unwrap()
-}
-
 #[test]
 fn the_timestep_and_the_evaluations_are_runs() {
     let all = scenes();
     let swing = all.iter().find(|scene| scene.name == "swing-2").unwrap();
     let duration = swing.task.duration;
     let evaluations = |method: Method| {
-        let coarse = fewest_steps(swing, method, 1e-2, 1);
-        let steps = fewest_steps(swing, method, 1e-4, coarse);
-        (steps * u64::from(method.evaluations())) as f64
+        let is_enough = |steps: &u64| swing.task.run(method, *steps, 1e-4).error <= 1e-4;
+        let most = (0..).map(|halving| OUTPUTS << halving).find(is_enough);
+        let fewest = swing.task.fewest(method, 1e-4, (1, most.unwrap()), 256);
+        fewest.unwrap().evaluations as f64
     };
     let rk4 = evaluations(Method::Rk4);
     let steps = rk4 / f64::from(Method::Rk4.evaluations());

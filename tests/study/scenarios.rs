@@ -15,16 +15,6 @@ fn there_are_39_scenes_in_order() {
     }
 }
 
-/// A quick report has the other ones.
-#[test]
-#[ignore = "takes some seconds; the report runs them"]
-fn every_slow_scene_is_as_expected() {
-    for scene in all().into_iter().filter(|scene| scene.slow) {
-        let (holds, observed) = scene.run();
-        assert!(holds, "{}: {observed}, not {}", scene.id, scene.expected);
-    }
-}
-
 /// Each scene has a picture of a live arm, or a reason why there is none; a link spells all of the arm's settings.
 #[test]
 fn scenes_are_shown_by_live_arms() {

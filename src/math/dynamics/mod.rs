@@ -42,6 +42,7 @@ pub(super) use articulated_body::recursion;
 pub use one_arm::{forward_dynamics, weightless_dynamics};
 
 use super::arm::{Arm, State};
+use super::number::Arithmetic;
 use super::trig;
 use glam::DVec2;
 
@@ -214,11 +215,11 @@ fn directions<const N: usize>(q: &[f64; N]) -> [DVec2; N] {
     })
 }
 
-/// Rates (or accelerations) of the links from those of the joints: `y_i = x_1 + … + x_i`.
-fn running_sum<const N: usize>(x: &[f64; N]) -> [f64; N] {
-    let mut sum = 0.0;
+/// Angles, rates or accelerations of the links from those of the joints: `y_i = x_1 + … + x_i`.
+pub(crate) fn running_sum<T: Arithmetic + Default, const N: usize>(x: &[T; N]) -> [T; N] {
+    let mut sum = T::default();
     x.map(|x| {
-        sum += x;
+        sum = sum + x;
         sum
     })
 }

@@ -5,8 +5,9 @@
 //!
 //! **Invariant:** an angle that is in range is returned bit for bit.
 
-use crate::math::elementary::{atan2, sin_cos};
 use std::f64::consts::PI;
+
+use libm::{atan2, sincos};
 
 /// `angle` \[rad\] in (-π, π].
 #[must_use]
@@ -14,7 +15,7 @@ pub fn wrap(angle: f64) -> f64 {
     if -PI < angle && angle <= PI {
         return angle;
     }
-    let (sin, cos) = sin_cos(angle);
+    let (sin, cos) = sincos(angle);
     let wrapped = atan2(sin, cos);
     if wrapped > -PI { wrapped } else { PI }
 }
@@ -26,8 +27,8 @@ pub fn turn(from: f64, to: f64) -> f64 {
     if difference.abs() <= PI {
         return difference;
     }
-    let (sin_from, cos_from) = sin_cos(from);
-    let (sin_to, cos_to) = sin_cos(to);
+    let (sin_from, cos_from) = sincos(from);
+    let (sin_to, cos_to) = sincos(to);
     atan2(
         sin_to * cos_from - cos_to * sin_from,
         cos_to * cos_from + sin_to * sin_from,

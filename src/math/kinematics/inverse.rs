@@ -19,9 +19,9 @@
 //! moved.
 
 use glam::DVec2;
+use libm::{atan2, hypot};
 
 use super::{Reach, Target, Unreachable, heading, turn, wrap};
-use crate::math::elementary::{atan2, hypot};
 
 /// Distance outside the reach at which a target still counts as on its edge, relative to the sum of the lengths. It
 /// is far above the rounding error of a boundary computed elsewhere (1e-13), and far below any intended distance (1

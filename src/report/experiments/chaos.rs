@@ -4,12 +4,12 @@
 
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
-use crate::math::dynamics::{coupling, energy, kinetic_energy, solve, weight_moment};
+use crate::math::dynamics::{coupling, energy, kinetic_energy, running_sum, solve, weight_moment};
 use crate::math::integrator::Method;
 use crate::math::trig;
 use crate::study::control_loop::ControlLoop;
 use crate::study::motion::lowest;
-use crate::study::taylor::series::{differences, sums};
+use crate::study::taylor::series::differences;
 
 /// Energy drift over the energy scale, largest so far, at times that grow by a factor, and at the end: `(time, drift)`.
 pub fn energy_drift<const N: usize>(
@@ -84,7 +84,7 @@ struct Hamiltonian<'a, const N: usize> {
 
 impl<'a, const N: usize> Hamiltonian<'a, N> {
     fn new(arm: &'a Arm<N>, start: &State<N>) -> Self {
-        let (angle, rate) = (sums(&start.position), sums(&start.velocity));
+        let (angle, rate) = (running_sum(&start.position), running_sum(&start.velocity));
         let matrix = matrix(arm, &trig::sin_cos(&angle));
         let momentum = matrix.map(|row| row.iter().zip(&rate).map(|(k, rate)| k * rate).sum());
         let y = [angle, momentum];

@@ -4,7 +4,7 @@
 
 use crate::report::experiments::scenarios;
 use crate::report::scenes::{LiveScene, live_scenes};
-use crate::report::section::{Cell, Section, Table};
+use crate::report::section::{Cell, Section, Table, verdict};
 use crate::report::svg::{Axis, Curve, Form, Key, Plot, Thumbnail, number, plain, seconds};
 use crate::study::matrix::largest;
 
@@ -30,20 +30,15 @@ pub(super) fn make(section: &mut Section) {
         if holds == Some(false) {
             short.push(name.clone());
         }
-        let (observed, cell) = match verdict {
-            Some((holds, observed)) => (plain(&observed), Cell::verdict(holds)),
-            None => (
-                "not run in a quick report".to_owned(),
-                Cell::new("not run").class("soft"),
-            ),
-        };
+        let observed = verdict.map(|(_, observed)| plain(&observed));
+        let observed = observed.unwrap_or_else(|| "not run in a quick report".to_owned());
         panels.push(picture(&name, live, holds));
         table.rows.push(vec![
             Cell::new(scene.id),
             Cell::new(&live.name).detail(plain(scene.parameters)),
             Cell::new(plain(scene.expected)),
             Cell::new(observed),
-            cell,
+            Cell::verdict(holds),
         ]);
     }
     let names = short.join(", ");
@@ -112,15 +107,10 @@ fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Plot {
         ),
         Err(why) => (String::new(), why),
     };
-    let verdict = match holds {
-        Some(true) => ("good", "holds"),
-        Some(false) => ("bad", "does not hold"),
-        None => ("soft", "not run"),
-    };
     plot.form = Form::Thumbnail(Thumbnail {
         link,
         note,
-        verdict,
+        verdict: verdict(holds),
     });
     plot
 }

@@ -3,23 +3,21 @@
 //! **Invariant:** gains that are not given do not change.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::math::pid::Gains;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
-/// Sets the controller's gains, each at least 0.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SetGains<const N: usize> {
-    /// \[N m/rad\].
-    pub kp: Option<[f64; N]>,
-    /// \[N m/(rad s)\].
-    pub ki: Option<[f64; N]>,
-    /// \[N m s/rad\].
-    pub kd: Option<[f64; N]>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
+request! {
+    /// Sets the controller's gains, each at least 0.
+    pub struct SetGains<N> -> Echo<Gains<N>>, |fields| {
+        /// \[N m/rad\].
+        kp: Option<[f64; N]> = fields.array("kp", Bound::NonNegative),
+        /// \[N m/(rad s)\].
+        ki: Option<[f64; N]> = fields.array("ki", Bound::NonNegative),
+        /// \[N m s/rad\].
+        kd: Option<[f64; N]> = fields.array("kd", Bound::NonNegative),
+    }
 }
 
 impl<const N: usize> SetGains<N> {
@@ -34,30 +32,13 @@ impl<const N: usize> SetGains<N> {
     }
 }
 
-impl<const N: usize> Ask for SetGains<N> {
-    type Answer = Echo<Gains<N>>;
-}
-
-impl<const N: usize> FieldByField for SetGains<N> {
-    fn from_fields(fields: &mut Fields<'_>) -> Self {
-        Self {
-            kp: fields.array("kp", Bound::NonNegative),
-            ki: fields.array("ki", Bound::NonNegative),
-            kd: fields.array("kd", Bound::NonNegative),
-            rejected: fields.rejections(),
-        }
-    }
-}
-
 impl<const N: usize> Answered for SetGains<N> {
     fn write(Echo { values, rejected }: Echo<Gains<N>>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values<'a> {
-            kp: &'a [f64],
-            ki: &'a [f64],
-            kd: &'a [f64],
-        }
-        let Gains { kp, ki, kd } = &values;
-        to.response(&Values { kp, ki, kd }, &rejected.status())
+        let values = object! {
+            kp: values.kp.as_slice(),
+            ki: values.ki.as_slice(),
+            kd: values.kd.as_slice(),
+        };
+        to.response(&values, &rejected.status())
     }
 }

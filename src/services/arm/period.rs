@@ -3,21 +3,19 @@
 //! **Invariant:** setting the present values does not change the arm, not even the step in its period.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::math::simulation::ControlPeriod;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
-/// Sets the time between two runs of the control law.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SetPeriod {
-    /// That time \[s\], not negative; 0 for every step.
-    pub period: Option<f64>,
-    /// Whether an effort is applied one period after its state was read.
-    pub delay: Option<bool>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
+request! {
+    /// Sets the time between two runs of the control law.
+    pub struct SetPeriod -> Echo<PeriodInForce>, |fields| {
+        /// That time \[s\], not negative; 0 for every step.
+        period: Option<f64> = fields.number("period", Bound::NonNegative),
+        /// Whether an effort is applied one period after its state was read.
+        delay: Option<bool> = fields.boolean("delay"),
+    }
 }
 
 /// The present control period.
@@ -29,33 +27,12 @@ pub struct PeriodInForce {
     pub effective: f64,
 }
 
-impl Ask for SetPeriod {
-    type Answer = Echo<PeriodInForce>;
-}
-
-impl FieldByField for SetPeriod {
-    fn from_fields(fields: &mut Fields<'_>) -> Self {
-        Self {
-            period: fields.number("period", Bound::NonNegative),
-            delay: fields.boolean("delay"),
-            rejected: fields.rejections(),
-        }
-    }
-}
-
 impl Answered for SetPeriod {
     fn write(Echo { values, rejected }: Echo<PeriodInForce>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values {
-            period: f64,
-            effective_period: f64,
-            delay: bool,
-        }
-        let ControlPeriod { period, delay } = values.period;
-        let values = Values {
-            period,
+        let values = object! {
+            period: values.period.period,
             effective_period: values.effective,
-            delay,
+            delay: values.period.delay,
         };
         to.response(&values, &rejected.status())
     }

@@ -3,23 +3,21 @@
 //! **Invariant:** the arm is replaced as a whole, or not at all.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::math::arm::{Arm, ArmError};
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
-/// Sets the arm's parameters.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SetParams<const N: usize> {
-    /// \[m/s²\], at least 0.
-    pub gravity: Option<f64>,
-    /// \[kg\], greater than 0.
-    pub masses: Option<[f64; N]>,
-    /// \[m\], greater than 0.
-    pub lengths: Option<[f64; N]>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
+request! {
+    /// Sets the arm's parameters.
+    pub struct SetParams<N> -> Echo<Arm<N>>, |fields| {
+        /// \[m/s²\], at least 0.
+        gravity: Option<f64> = fields.number("gravity", Bound::NonNegative),
+        /// \[kg\], greater than 0.
+        masses: Option<[f64; N]> = fields.array("masses", Bound::Positive),
+        /// \[m\], greater than 0.
+        lengths: Option<[f64; N]> = fields.array("lengths", Bound::Positive),
+    }
 }
 
 impl<const N: usize> SetParams<N> {
@@ -36,33 +34,12 @@ impl<const N: usize> SetParams<N> {
     }
 }
 
-impl<const N: usize> Ask for SetParams<N> {
-    type Answer = Echo<Arm<N>>;
-}
-
-impl<const N: usize> FieldByField for SetParams<N> {
-    fn from_fields(fields: &mut Fields<'_>) -> Self {
-        Self {
-            gravity: fields.number("gravity", Bound::NonNegative),
-            masses: fields.array("masses", Bound::Positive),
-            lengths: fields.array("lengths", Bound::Positive),
-            rejected: fields.rejections(),
-        }
-    }
-}
-
 impl<const N: usize> Answered for SetParams<N> {
     fn write(Echo { values, rejected }: Echo<Arm<N>>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values<'a> {
-            gravity: f64,
-            masses: &'a [f64],
-            lengths: &'a [f64],
-        }
-        let values = Values {
+        let values = object! {
             gravity: values.gravity(),
-            masses: values.masses(),
-            lengths: values.lengths(),
+            masses: values.masses().as_slice(),
+            lengths: values.lengths().as_slice(),
         };
         to.response(&values, &rejected.status())
     }

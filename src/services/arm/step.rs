@@ -7,7 +7,6 @@
 //! or the runtime ends.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::math::arm::State;
 use crate::protocol::messages::Empty;
@@ -20,15 +19,14 @@ pub const MAX_STEPS: u64 = 10_000;
 /// Steps per turn: about 0.2 ms of work, so neither the tick nor another client's call waits long.
 pub const STEPS_IN_A_ROW: u64 = 1000;
 
-/// Takes steps while paused. Refused if a field was rejected, or if the arm cannot be stepped.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Step<const N: usize> {
-    /// The number of steps, 1 to [`MAX_STEPS`].
-    pub steps: Option<u64>,
-    /// The effort in these steps \[N m\], in place of the controller's; `None` for the controller's.
-    pub effort: Option<[f64; N]>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
+request! {
+    /// Takes steps while paused. Refused if a field was rejected, or if the arm cannot be stepped.
+    pub struct Step<N> -> Result<Stepped<N>, Rejections>, |fields| {
+        /// The number of steps, 1 to [`MAX_STEPS`].
+        steps: Option<u64> = fields.count("steps", 1..=MAX_STEPS),
+        /// The effort in these steps \[N m\], in place of the controller's; `None` for the controller's.
+        effort: Option<[f64; N]> = fields.array("effort", Bound::Finite),
+    }
 }
 
 /// The taken steps.
@@ -57,30 +55,8 @@ pub enum StepsEnd {
     Resumed,
 }
 
-impl<const N: usize> Ask for Step<N> {
-    type Answer = Result<Stepped<N>, Rejections>;
-}
-
-impl<const N: usize> FieldByField for Step<N> {
-    fn from_fields(fields: &mut Fields<'_>) -> Self {
-        Self {
-            steps: fields.count("steps", 1..=MAX_STEPS),
-            effort: fields.array("effort", Bound::Finite),
-            rejected: fields.rejections(),
-        }
-    }
-}
-
 impl<const N: usize> Answered for Step<N> {
     fn write(answer: Result<Stepped<N>, Rejections>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values<'a> {
-            steps: u64,
-            time: f64,
-            position: &'a [f64],
-            velocity: &'a [f64],
-            effort: &'a [f64],
-        }
         match answer {
             Ok(stepped) => {
                 let status = match stepped.end {
@@ -88,12 +64,12 @@ impl<const N: usize> Answered for Step<N> {
                     StepsEnd::Diverged => "steps ended early: the simulation has diverged",
                     StepsEnd::Resumed => "steps ended early: the arm has been resumed",
                 };
-                let values = Values {
+                let values = object! {
                     steps: stepped.steps,
                     time: stepped.time,
-                    position: &stepped.state.position,
-                    velocity: &stepped.state.velocity,
-                    effort: &stepped.effort,
+                    position: stepped.state.position.as_slice(),
+                    velocity: stepped.state.velocity.as_slice(),
+                    effort: stepped.effort.as_slice(),
                 };
                 to.response(&values, status)
             }

@@ -4,40 +4,19 @@
 //! ends.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::protocol::op::fields::{Fields, Rejections};
 use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
-#[derive(Serialize)]
-struct Switch {
-    data: bool,
-}
-
 fn write_switch(echo: &Echo<bool>, to: &Address) -> Bytes {
-    let data = echo.values;
-    to.response(&Switch { data }, &echo.rejected.status())
+    to.response(&object! { data: echo.values }, &echo.rejected.status())
 }
 
-/// Freezes or resumes simulation time. The answer is whether it is frozen.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Pause {
-    /// True to freeze it.
-    pub paused: Option<bool>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
-}
-
-impl Ask for Pause {
-    type Answer = Echo<bool>;
-}
-
-impl FieldByField for Pause {
-    fn from_fields(fields: &mut Fields<'_>) -> Self {
-        Self {
-            paused: fields.boolean("data"),
-            rejected: fields.rejections(),
-        }
+request! {
+    /// Freezes or resumes simulation time. The answer is whether it is frozen.
+    pub struct Pause -> Echo<bool>, |fields| {
+        /// True to freeze it.
+        paused: Option<bool> = fields.boolean("data"),
     }
 }
 
@@ -47,25 +26,11 @@ impl Answered for Pause {
     }
 }
 
-/// Switches the controller on or off. The answer is whether it is on.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Enable {
-    /// True to switch it on.
-    pub enabled: Option<bool>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
-}
-
-impl Ask for Enable {
-    type Answer = Echo<bool>;
-}
-
-impl FieldByField for Enable {
-    fn from_fields(fields: &mut Fields<'_>) -> Self {
-        Self {
-            enabled: fields.boolean("data"),
-            rejected: fields.rejections(),
-        }
+request! {
+    /// Switches the controller on or off. The answer is whether it is on.
+    pub struct Enable -> Echo<bool>, |fields| {
+        /// True to switch it on.
+        enabled: Option<bool> = fields.boolean("data"),
     }
 }
 

@@ -3,7 +3,6 @@
 //! **Invariant:** every returned answer was simulated, and the live arm does not change.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use super::{Computed, Present, Refused, StudyWork, arm_of, with_period};
 use crate::math::arm::{ArmError, State};
@@ -17,9 +16,7 @@ use crate::services::arm::{SetGains, SetParams};
 use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::gains::{GainsError, GainsRequirements, SuggestedGains, search_gains};
-use crate::study::paused::Paused;
 use crate::study::planner::{PlanError, Planned, Task, plan};
-use crate::study::stability::most_bytes;
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -51,31 +48,31 @@ pub struct Suggested<const N: usize> {
     pub timestep: f64,
 }
 
-/// Searches the cheapest method and timestep that keep a run within an error.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PlanRun<const N: usize> {
-    /// The allowed error of the end effector \[m\], greater than 0.
-    pub error: f64,
-    /// The duration of the run \[s\], greater than 0.
-    pub duration: Option<f64>,
-    /// Whether the present gains apply if the request has none.
-    pub controller: bool,
-    /// Initial positions \[rad\].
-    pub q0: Option<[f64; N]>,
-    /// Initial velocities \[rad/s\].
-    pub qdot0: Option<[f64; N]>,
-    /// Changed parameters of the arm.
-    pub params: Option<SetParams<N>>,
-    /// Changed gains.
-    pub gains: Option<SetGains<N>>,
-    /// The setpoint \[rad\], at rest.
-    pub setpoint: Option<[f64; N]>,
-    /// The control period \[s\]; `None` or 0 to plan it.
-    pub control_period: Option<f64>,
-}
-
-impl<const N: usize> Ask for PlanRun<N> {
-    type Answer = Result<PlannedRun, Refused<PlanError>>;
+request! {
+    whole
+    /// Searches the cheapest method and timestep that keep a run within an error.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct PlanRun<N> -> Result<PlannedRun, Refused<PlanError>>, |fields| {
+        /// The allowed error of the end effector \[m\], greater than 0. The catalog requires it: without it the request
+        /// is rejected.
+        error: f64 = fields.number("error", Bound::Positive).unwrap_or(f64::NAN),
+        /// The duration of the run \[s\], greater than 0.
+        duration: Option<f64> = fields.number("duration", Bound::Positive),
+        /// Whether the present gains apply if the request has none.
+        controller: bool = fields.boolean("controller").unwrap_or(false),
+        /// Initial positions \[rad\].
+        q0: Option<[f64; N]> = fields.array("q0", Bound::Finite),
+        /// Initial velocities \[rad/s\].
+        qdot0: Option<[f64; N]> = fields.array("qdot0", Bound::Finite),
+        /// Changed parameters of the arm.
+        params: Option<SetParams<N>> = fields.object("params", SetParams::from_fields),
+        /// Changed gains.
+        gains: Option<SetGains<N>> = fields.object("gains", SetGains::from_fields),
+        /// The setpoint \[rad\], at rest.
+        setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
+        /// The control period \[s\]; `None` or 0 to plan it.
+        control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
+    }
 }
 
 /// A simulated plan.
@@ -108,87 +105,38 @@ impl<const N: usize> Callable for SuggestGains<N> {
 
 impl<const N: usize> Answered for SuggestGains<N> {
     fn write(answer: Self::Answer, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values {
-            kp: Vec<f64>,
-            ki: Vec<f64>,
-            kd: Vec<f64>,
-            timestep_limit: Option<f64>,
-            certified: bool,
-            margin: Option<f64>,
-            settled_after: f64,
-        }
-        to.outcome(answer.map(|Suggested { found, timestep }| Values {
-            kp: found.gains.kp.to_vec(),
-            ki: found.gains.ki.to_vec(),
-            kd: found.gains.kd.to_vec(),
-            timestep_limit: found.limit,
-            certified: found.certified,
-            margin: found.limit.map(|limit| limit / timestep),
-            settled_after: found.settled_after,
+        to.outcome(answer.as_ref().map(|Suggested { found, timestep }| {
+            object! {
+                kp: found.gains.kp.as_slice(),
+                ki: found.gains.ki.as_slice(),
+                kd: found.gains.kd.as_slice(),
+                timestep_limit: found.limit,
+                certified: found.certified,
+                margin: found.limit.map(|limit| limit / timestep),
+                settled_after: found.settled_after,
+            }
         }))
-    }
-}
-
-impl<const N: usize> Callable for PlanRun<N> {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read(arguments, service)?;
-        let ask = Self {
-            // The catalog requires the field: without it the question is rejected.
-            error: fields.number("error", Bound::Positive).unwrap_or(f64::NAN),
-            duration: fields.number("duration", Bound::Positive),
-            controller: fields.boolean("controller").unwrap_or(false),
-            q0: fields.array("q0", Bound::Finite),
-            qdot0: fields.array("qdot0", Bound::Finite),
-            params: fields.object("params", SetParams::from_fields),
-            gains: fields.object("gains", SetGains::from_fields),
-            setpoint: fields.array("setpoint", Bound::Finite),
-            control_period: fields.number("control_period", Bound::NonNegative),
-        };
-        fields.accept(ask)
     }
 }
 
 impl<const N: usize> Answered for PlanRun<N> {
     fn write(answer: Self::Answer, to: &Address) -> Bytes {
-        to.outcome(answer.map(PlanValues::from))
-    }
-}
-
-#[derive(Serialize)]
-struct PlanValues {
-    integrator: &'static str,
-    timestep: f64,
-    control_period: Option<f64>,
-    evaluations_per_second: f64,
-    error: f64,
-    error_uncertainty: f64,
-    methods: Vec<&'static str>,
-    timesteps: Vec<f64>,
-    evaluations: Vec<u64>,
-    errors: Vec<f64>,
-}
-
-impl From<PlannedRun> for PlanValues {
-    fn from(run: PlannedRun) -> Self {
-        let PlannedRun {
-            planned,
-            control_period,
-        } = run;
-        let best = planned.best;
-        let all = || planned.candidates.iter().rev();
-        Self {
-            integrator: best.method.name(),
-            timestep: best.timestep,
-            control_period,
-            evaluations_per_second: f64::from(best.method.evaluations()) / best.timestep,
-            error: best.error,
-            error_uncertainty: planned.uncertainty,
-            methods: all().map(|one| one.method.name()).collect(),
-            timesteps: all().map(|one| one.timestep).collect(),
-            evaluations: all().map(|one| one.evaluations).collect(),
-            errors: all().map(|one| one.error).collect(),
-        }
+        to.outcome(answer.map(|run| {
+            let best = run.planned.best;
+            let all = || run.planned.candidates.iter().rev();
+            object! {
+                integrator: best.method.name(),
+                timestep: best.timestep,
+                control_period: run.control_period,
+                evaluations_per_second: f64::from(best.method.evaluations()) / best.timestep,
+                error: best.error,
+                error_uncertainty: run.planned.uncertainty,
+                methods: all().map(|one| one.method.name()).collect::<Vec<_>>(),
+                timesteps: all().map(|one| one.timestep).collect::<Vec<_>>(),
+                evaluations: all().map(|one| one.evaluations).collect::<Vec<_>>(),
+                errors: all().map(|one| one.error).collect::<Vec<_>>(),
+            }
+        }))
     }
 }
 
@@ -209,17 +157,13 @@ impl<const N: usize> Computed<N> for SuggestGains<N> {
     type Work = StudyWork<Self::Answer>;
 
     fn work(self, present: Present<N>) -> Self::Work {
-        let computation = Paused::new(async move {
+        StudyWork::new::<N>(async move {
             let (control, requirements) = demands(&self, &present.control)?;
             let found = search_gains(control, requirements).await;
             let found = found.map_err(Refused::Study)?;
             let timestep = control.timestep;
             Ok(Suggested { found, timestep })
-        });
-        StudyWork {
-            most_bytes: most_bytes::<N>(),
-            computation,
-        }
+        })
     }
 }
 
@@ -249,7 +193,7 @@ impl<const N: usize> Computed<N> for PlanRun<N> {
     type Work = StudyWork<Self::Answer>;
 
     fn work(self, present: Present<N>) -> Self::Work {
-        let computation = Paused::new(async move {
+        StudyWork::new::<N>(async move {
             let task = task(&self, &present)?;
             let planned = plan(task).await.map_err(Refused::Study)?;
             let period = task.control.period.period;
@@ -259,11 +203,7 @@ impl<const N: usize> Computed<N> for PlanRun<N> {
                 planned,
                 control_period: (!task.control.is_free()).then_some(period),
             })
-        });
-        StudyWork {
-            most_bytes: most_bytes::<N>(),
-            computation,
-        }
+        })
     }
 }
 

@@ -5,7 +5,6 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use super::{NUMBER_BYTES, Work};
 use crate::math::expression::Expression;
@@ -130,23 +129,12 @@ impl Callable for IntegrationStep {
 
 impl Answered for IntegrationStep {
     fn write(answer: Result<Box<Particle>, NotIntegrated>, to: &Address) -> Bytes {
-        /// The samples, in the order of the documentation.
-        #[derive(Serialize)]
-        struct Samples<'a> {
-            times: Vec<f64>,
-            positions: &'a [f64],
-            velocities: &'a [f64],
-        }
-        let particle = match answer {
-            Ok(particle) => particle,
-            Err(why) => return to.failure(&why.to_string()),
-        };
-        let positions = particle.positions();
-        let samples = Samples {
-            times: (0..positions.len()).map(|at| particle.time(at)).collect(),
-            positions,
-            velocities: particle.velocities(),
-        };
-        to.response(&samples, "")
+        to.outcome(answer.as_ref().map(|particle| {
+            object! {
+                times: particle.times().collect::<Vec<_>>(),
+                positions: particle.positions(),
+                velocities: particle.velocities(),
+            }
+        }))
     }
 }

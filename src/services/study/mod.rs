@@ -22,6 +22,7 @@ use crate::math::arm::{Arm, ArmError};
 use crate::math::simulation::ControlPeriod;
 use crate::study::control_loop::ControlLoop;
 use crate::study::paused::Paused;
+use crate::study::stability::most_bytes;
 
 /// Bytes of the longest number with its comma, and of the number itself while the answer is computed.
 pub(crate) const NUMBER_BYTES: usize = 25 + 8;
@@ -61,6 +62,16 @@ pub enum Refused<E> {
 pub struct StudyWork<T> {
     most_bytes: usize,
     computation: Paused<T>,
+}
+
+impl<T> StudyWork<T> {
+    /// A computation for an arm of `N` links that searches over its poses.
+    fn new<const N: usize>(computation: impl Future<Output = T> + Send + 'static) -> Self {
+        Self {
+            most_bytes: most_bytes::<N>(),
+            computation: Paused::new(computation),
+        }
+    }
 }
 
 impl<T> Work<T> for StudyWork<T> {

@@ -28,35 +28,34 @@ use crate::study::rollout::{
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
-/// Runs the arm offline.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct RunOffline<const N: usize> {
-    /// Initial positions \[rad\]; 0 by default.
-    pub q0: Option<[f64; N]>,
-    /// Initial velocities \[rad/s\]; 0 by default.
-    pub qdot0: Option<[f64; N]>,
-    /// Duration \[s\], greater than 0.
-    pub duration: Option<f64>,
-    /// Length of a step \[s\], greater than 0.
-    pub timestep: Option<f64>,
-    /// The time between two runs of the control law \[s\], not negative; 0 for every step.
-    pub control_period: Option<f64>,
-    /// The method that takes the steps.
-    pub method: Option<Method>,
-    /// Changed parameters of the arm.
-    pub params: Option<SetParams<N>>,
-    /// The gains. Without them the arm is free. A missing member counts as 0.
-    pub gains: Option<SetGains<N>>,
-    /// The setpoint \[rad\], at rest.
-    pub setpoint: Option<[f64; N]>,
-    /// The number of samples.
-    pub samples: Option<u64>,
-    /// Whether to run a reference too.
-    pub reference: Option<bool>,
-}
-
-impl<const N: usize> Ask for RunOffline<N> {
-    type Answer = RunAnswer<N>;
+request! {
+    whole
+    /// Runs the arm offline.
+    #[derive(Debug, Clone, PartialEq, Default)]
+    pub struct RunOffline<N> -> RunAnswer<N>, |fields| {
+        /// Initial positions \[rad\]; 0 by default.
+        q0: Option<[f64; N]> = fields.array("q0", Bound::Finite),
+        /// Initial velocities \[rad/s\]; 0 by default.
+        qdot0: Option<[f64; N]> = fields.array("qdot0", Bound::Finite),
+        /// Duration \[s\], greater than 0.
+        duration: Option<f64> = fields.number("duration", Bound::Positive),
+        /// Length of a step \[s\], greater than 0.
+        timestep: Option<f64> = fields.number("timestep", Bound::Positive),
+        /// The time between two runs of the control law \[s\], not negative; 0 for every step.
+        control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
+        /// The method that takes the steps.
+        method: Option<Method> = fields.choice("integrator", &Method::ALL, Method::name),
+        /// Changed parameters of the arm.
+        params: Option<SetParams<N>> = fields.object("params", SetParams::from_fields),
+        /// The gains. Without them the arm is free. A missing member counts as 0.
+        gains: Option<SetGains<N>> = fields.object("gains", SetGains::from_fields),
+        /// The setpoint \[rad\], at rest.
+        setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
+        /// The number of samples.
+        samples: Option<u64> = fields.count("samples", 2..=MAX_SAMPLES),
+        /// Whether to run a reference too.
+        reference: Option<bool> = fields.boolean("reference"),
+    }
 }
 
 /// A run, or the reason why there is none.
@@ -72,50 +71,15 @@ pub struct Ran<const N: usize> {
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
 
-impl<const N: usize> Callable for RunOffline<N> {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read(arguments, service)?;
-        let ask = Self {
-            q0: fields.array("q0", Bound::Finite),
-            qdot0: fields.array("qdot0", Bound::Finite),
-            duration: fields.number("duration", Bound::Positive),
-            timestep: fields.number("timestep", Bound::Positive),
-            control_period: fields.number("control_period", Bound::NonNegative),
-            method: fields.choice("integrator", &Method::ALL, Method::name),
-            params: fields.object("params", SetParams::from_fields),
-            gains: fields.object("gains", SetGains::from_fields),
-            setpoint: fields.array("setpoint", Bound::Finite),
-            samples: fields.count("samples", 2..=MAX_SAMPLES),
-            reference: fields.boolean("reference"),
-        };
-        fields.accept(ask)
-    }
-}
-
 impl<const N: usize> Answered for RunOffline<N> {
     fn write(answer: RunAnswer<N>, to: &Address) -> Bytes {
-        /// The samples and the error, in the order of the documentation.
-        #[derive(Serialize)]
-        struct Values<'a, const N: usize> {
-            times: &'a [f64],
-            positions: Rows<'a, N>,
-            velocities: Rows<'a, N>,
-            efforts: Rows<'a, N>,
-            energy: &'a [f64],
-            evaluations: u64,
-            wall_time: f64,
-            error: Option<f64>,
-            error_uncertainty: Option<f64>,
-            sampling_error: Option<f64>,
-            sampling_error_uncertainty: Option<f64>,
-        }
         let Ran { run, took } = match answer {
             Ok(ran) => *ran,
             Err(why) => return to.failure(&why.to_string()),
         };
         let method = run.known(run.deviation.as_ref());
         let sampling = run.known(run.from_ideal.as_ref());
-        let values = Values {
+        let values = object! {
             times: &run.times,
             positions: Rows(&run.positions),
             velocities: Rows(&run.velocities),

@@ -6,7 +6,6 @@
 //! **Invariant:** a limit is missing if no unstable timestep was found, and 0 if no stable one was found.
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use super::{Computed, Present, StudyWork};
 use super::{arm_of, with_period};
@@ -22,28 +21,26 @@ use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
 use crate::study::motion::{FREE_SECONDS, Motion};
-use crate::study::paused::Paused;
-use crate::study::stability::{Limits, most_bytes, search_limits};
+use crate::study::stability::{Limits, search_limits};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
-/// Predicts the largest stable timesteps of a control loop.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct PredictStability<const N: usize> {
-    /// The method that takes the steps.
-    pub method: Option<Method>,
-    /// Changed gains.
-    pub gains: Option<SetGains<N>>,
-    /// Changed parameters of the arm.
-    pub params: Option<SetParams<N>>,
-    /// The setpoint \[rad\], at rest.
-    pub setpoint: Option<[f64; N]>,
-    /// The time between two runs of the control law \[s\], not negative; 0 for every step.
-    pub control_period: Option<f64>,
-}
-
-impl<const N: usize> Ask for PredictStability<N> {
-    type Answer = Result<Box<Predicted<N>>, ArmError>;
+request! {
+    whole
+    /// Predicts the largest stable timesteps of a control loop.
+    #[derive(Debug, Clone, PartialEq, Default)]
+    pub struct PredictStability<N> -> Result<Box<Predicted<N>>, ArmError>, |fields| {
+        /// The method that takes the steps.
+        method: Option<Method> = fields.choice("integrator", &Method::ALL, Method::name),
+        /// Changed gains.
+        gains: Option<SetGains<N>> = fields.object("gains", SetGains::from_fields),
+        /// Changed parameters of the arm.
+        params: Option<SetParams<N>> = fields.object("params", SetParams::from_fields),
+        /// The setpoint \[rad\], at rest.
+        setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
+        /// The time between two runs of the control law \[s\], not negative; 0 for every step.
+        control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
+    }
 }
 
 /// A prediction.
@@ -60,89 +57,43 @@ pub struct Predicted<const N: usize> {
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
 
-impl<const N: usize> Callable for PredictStability<N> {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read(arguments, service)?;
-        let ask = Self {
-            method: fields.choice("integrator", &Method::ALL, Method::name),
-            gains: fields.object("gains", SetGains::from_fields),
-            params: fields.object("params", SetParams::from_fields),
-            setpoint: fields.array("setpoint", Bound::Finite),
-            control_period: fields.number("control_period", Bound::NonNegative),
-        };
-        fields.accept(ask)
-    }
-}
-
 impl<const N: usize> Answered for PredictStability<N> {
     fn write(answer: Result<Box<Predicted<N>>, ArmError>, to: &Address) -> Bytes {
-        match answer {
-            Ok(predicted) => to.response(&StabilityValues::new(&predicted), ""),
-            Err(why) => to.failure(&format!("params {why}")),
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct StabilityValues {
-    control_period_limit: Option<f64>,
-    timestep_limit: Option<f64>,
-    timestep_limit_held: Option<f64>,
-    timestep_limit_continuous: Option<f64>,
-    equilibrium: Vec<f64>,
-    equilibrium_kind: &'static str,
-    minimum_over_poses_held: Option<f64>,
-    minimum_over_poses_continuous: Option<f64>,
-    minimum_over_poses_bound: Option<f64>,
-    bound_is_proven: bool,
-    certified: bool,
-    worst_pose: Option<Vec<f64>>,
-    critical: Option<CriticalValues>,
-    timestep_limit_motion: Option<f64>,
-    motion_speed: f64,
-    advised_timestep: Option<f64>,
-    advised_duration: Option<f64>,
-}
-
-#[derive(Serialize)]
-struct CriticalValues {
-    growth_per_step: f64,
-    frequency: f64,
-    joint: usize,
-}
-
-impl StabilityValues {
-    fn new<const N: usize>(predicted: &Predicted<N>) -> Self {
-        let Predicted {
-            limits,
-            clocks,
-            motion,
-            ..
-        } = predicted;
-        let limit = Some(motion.timestep).filter(|timestep| timestep.is_finite());
-        Self {
-            control_period_limit: clocks.period,
-            timestep_limit: clocks.timestep,
-            timestep_limit_held: limits.held,
-            timestep_limit_continuous: limits.continuous,
-            equilibrium: limits.equilibrium.to_vec(),
-            equilibrium_kind: limits.rest.name(),
-            minimum_over_poses_held: limits.minimum_held,
-            minimum_over_poses_continuous: limits.minimum_continuous,
-            minimum_over_poses_bound: limits.bound,
-            bound_is_proven: limits.bound_is_proven,
-            certified: limits.certified,
-            worst_pose: limits.worst_pose.map(|pose| pose.to_vec()),
-            critical: limits.critical.map(|critical| CriticalValues {
-                growth_per_step: critical.growth_per_step,
-                frequency: critical.frequency,
-                joint: critical.joint,
-            }),
-            timestep_limit_motion: limit,
-            motion_speed: motion.speed,
-            advised_timestep: limits.advised_for(motion),
-            advised_duration: predicted.is_free.then_some(FREE_SECONDS),
-        }
+        let answer = answer.map_err(|why| format!("params {why}"));
+        to.outcome(answer.as_ref().map(|predicted| {
+            let Predicted {
+                limits,
+                clocks,
+                motion,
+                ..
+            } = &**predicted;
+            let critical = limits.critical.map(|critical| {
+                object! {
+                    growth_per_step: critical.growth_per_step,
+                    frequency: critical.frequency,
+                    joint: critical.joint,
+                }
+            });
+            object! {
+                control_period_limit: clocks.period,
+                timestep_limit: clocks.timestep,
+                timestep_limit_held: limits.held,
+                timestep_limit_continuous: limits.continuous,
+                equilibrium: limits.equilibrium.as_slice(),
+                equilibrium_kind: limits.rest.name(),
+                minimum_over_poses_held: limits.minimum_held,
+                minimum_over_poses_continuous: limits.minimum_continuous,
+                minimum_over_poses_bound: limits.bound,
+                bound_is_proven: limits.bound_is_proven,
+                certified: limits.certified,
+                worst_pose: limits.worst_pose.as_ref().map(<[f64; N]>::as_slice),
+                critical: critical,
+                timestep_limit_motion: Some(motion.timestep).filter(|it| it.is_finite()),
+                motion_speed: motion.speed,
+                advised_timestep: limits.advised_for(motion),
+                advised_duration: predicted.is_free.then_some(FREE_SECONDS),
+            }
+        }))
     }
 }
 
@@ -152,7 +103,7 @@ impl<const N: usize> Computed<N> for PredictStability<N> {
     type Work = StudyWork<Self::Answer>;
 
     fn work(self, present: Present<N>) -> Self::Work {
-        let computation = Paused::new(async move {
+        StudyWork::new::<N>(async move {
             let control = control_loop(&self, &present.control)?;
             Ok(Box::new(Predicted {
                 motion: Motion::ahead(&control, &present.state),
@@ -160,11 +111,7 @@ impl<const N: usize> Computed<N> for PredictStability<N> {
                 is_free: control.is_free(),
                 limits: search_limits(control).await,
             }))
-        });
-        StudyWork {
-            most_bytes: most_bytes::<N>(),
-            computation,
-        }
+        })
     }
 }
 

@@ -9,8 +9,9 @@
 
 use std::ops::RangeInclusive;
 
+use libm::{exp2, log2};
+
 use super::{Complex, Matrix, largest};
-use crate::math::elementary::{exp2, log2};
 
 /// QR sweeps per eigenvalue before the iteration gives up. Two or three are usual.
 const MAX_SWEEPS: usize = 60;

@@ -7,7 +7,7 @@ mod eigenvalues;
 
 use std::ops::{Index, IndexMut};
 
-use crate::math::elementary::hypot;
+use libm::hypot;
 
 /// A real square matrix, indexed by `(row, column)`.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,12 +8,13 @@
 
 pub(crate) mod series;
 
+use libm::{log, pow};
+
 use super::matrix::largest;
 use super::paused::{PieceWork, at_once};
 use crate::math::arm::{Arm, State};
 use crate::math::count::{length_in_f64, whole};
 use crate::math::dynamics::forward_dynamics;
-use crate::math::elementary::{ln, pow};
 use crate::math::integrator::two_sum;
 use crate::math::number::Arithmetic;
 use crate::math::trig;
@@ -242,7 +243,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
 /// The order of least cost for a tolerance: two more than in Jorba and Zou, section 3.3. Their cost of a step grows
 /// with the square of its order. Here every step also needs an evaluation at its start.
 fn order_for(tolerance: f64) -> usize {
-    let order = whole((3.0 - 0.5 * ln(tolerance)).ceil());
+    let order = whole((3.0 - 0.5 * log(tolerance)).ceil());
     usize::try_from(order).map_or(HIGHEST_ORDER, |order| order.clamp(6, HIGHEST_ORDER))
 }
 

@@ -22,6 +22,7 @@
 
 use crate::math::arm::Arm;
 use crate::math::count::length_in_f64;
+use crate::math::dynamics::running_sum;
 use crate::math::number::Arithmetic;
 
 /// Highest order of the rates.
@@ -100,9 +101,9 @@ impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
     ) {
         (self.sin[0], self.cos[0]) = between(directions);
         self.equation = Equation::new(arm, &self.cos[0]);
-        self.rate[0] = sums(velocity);
+        self.rate[0] = running_sum(velocity);
         self.squared_rate[backwards(0)] = self.rate[0].map(|rate| rate * rate);
-        self.close(0, sums(acceleration));
+        self.close(0, running_sum(acceleration));
     }
 
     /// Computes the rates of the next order, with the coefficient of that order of the efforts about the links.
@@ -290,7 +291,7 @@ pub(crate) fn acceleration<T: Arithmetic + Default, const N: usize>(
 ) -> [T; N] {
     let (sin, cos) = between(directions);
     let equation = Equation::new(arm, &cos);
-    let rate = sums(velocity);
+    let rate = running_sum(velocity);
     let mut right = link_efforts(effort);
     for i in 0..N {
         right[i] = right[i] - equation.factors[0][i] * cos[0][i];
@@ -317,15 +318,6 @@ pub(crate) fn link_efforts<T: Arithmetic, const N: usize>(joints: &[T; N]) -> [T
 fn reciprocal<T: Arithmetic + Default>(count: usize) -> T {
     let real = |value| T::default().like(value);
     real(1.0) / real(length_in_f64(count))
-}
-
-/// Rates of the links from those of the joints.
-pub(crate) fn sums<T: Arithmetic + Default, const N: usize>(joints: &[T; N]) -> [T; N] {
-    let mut sum = T::default();
-    joints.map(|joint| {
-        sum = sum + joint;
-        sum
-    })
 }
 
 /// Rates of the joints from those of the links.

@@ -65,17 +65,3 @@ fn other_numbers_of_links_have_no_closed_form() {
     let one = refusal([1.0], at(1.0, 0.0));
     assert_eq!(one, "inverse kinematics is solved for 2 or 3 links, not 1");
 }
-
-#[test]
-fn the_reach_of_an_arm_is_a_ring_or_a_disc() {
-    let links: [(&[f64], f64, f64); 5] = [
-        (&[1.0, 1.0], 0.0, 2.0),
-        (&[0.5, 2.0], 1.5, 2.5),
-        (&[1.0, 4.0, 0.5], 2.5, 5.5),
-        (&[1.0, 1.0, 1.0], 0.0, 3.0),
-        (&[2.0], 2.0, 2.0),
-    ];
-    for (lengths, inner, outer) in links {
-        assert_eq!(Reach::of(lengths), Reach { inner, outer }, "{lengths:?}");
-    }
-}

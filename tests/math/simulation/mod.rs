@@ -134,13 +134,3 @@ fn only_a_start_and_a_reset_of_the_controller_empty_its_integral() {
     let reset = (*law.integral(), law.setpoint().position, law.is_enabled());
     assert_eq!(reset, (empty, empty, true));
 }
-
-#[test]
-fn increments_are_added_to_a_state() {
-    let state = State {
-        position: [1.0, 2.0],
-        velocity: [3.0, 4.0],
-    };
-    let sum = state.plus(&([0.5, -0.5], [2.0, -3.0]));
-    assert_eq!((sum.position, sum.velocity), ([1.5, 1.5], [5.0, 1.0]));
-}

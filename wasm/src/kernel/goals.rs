@@ -7,12 +7,11 @@ use pendularm::live::{GoalOrder, GoalProgress, Obstacle};
 use pendularm::math::goal::Outcome;
 use pendularm::math::kinematics::Unreachable;
 use pendularm::protocol::catalog::Topic;
-use pendularm::protocol::messages::{self, Level};
+use pendularm::protocol::messages::Level;
 use pendularm::services::goals::{AcceptedGoal, CancelRejected, GoalRequest};
 use pendularm::services::{Address, Answered as _};
 
 use super::Kernel;
-use pendularm::live::World as _;
 
 /// The active goal.
 #[derive(Clone)]
@@ -74,10 +73,8 @@ impl<const N: usize> Kernel<N> {
     pub(super) fn set_in_motion(&mut self) {
         if let Some(ActiveGoal { goal, .. }) = &self.goal {
             let (number, positions, goal) = (goal.number, goal.positions, goal.clone());
-            let topic = Topic::JointTrajectory;
-            self.arm.world().publish(topic, move || {
-                messages::publish(topic.name(), &goal.trajectory())
-            });
+            self.arm
+                .publish(Topic::JointTrajectory, move || goal.trajectory());
             self.arm.command_goal(number, positions);
         }
     }
@@ -101,13 +98,11 @@ impl<const N: usize> Kernel<N> {
     /// Sends feedback or the end of the active goal.
     pub(super) fn judge(&mut self, progress: GoalProgress<N>) {
         let is_active = |active: &ActiveGoal<N>| active.goal.number == progress.number;
-        let world = self.arm.world();
         match progress.outcome {
             None => {
                 if let Some(active) = self.goal.as_ref().filter(|goal| is_active(goal)) {
                     let feedback = active.goal.feedback(progress.distance, progress.elapsed);
-                    let topic = Topic::IkFeedback;
-                    world.publish(topic, move || messages::publish(topic.name(), &feedback));
+                    self.arm.publish(Topic::IkFeedback, move || feedback);
                     if active.of_trial {
                         self.news.push_back((active.clone(), progress));
                     }
@@ -116,8 +111,7 @@ impl<const N: usize> Kernel<N> {
             Some(_) => {
                 if let Some(ended) = self.goal.take_if(|goal| is_active(goal)) {
                     let result = ended.goal.result(progress.distance, progress.outcome);
-                    let topic = Topic::IkResult;
-                    world.publish(topic, move || messages::publish(topic.name(), &result));
+                    self.arm.publish(Topic::IkResult, move || result);
                     if ended.of_trial {
                         self.news.push_back((ended, progress));
                     }

@@ -8,7 +8,6 @@ use std::time::Duration;
 use pendularm::live::World as _;
 use pendularm::math::trial::{Conclusion, Rejection, TrialCommand, sample};
 use pendularm::protocol::catalog::Topic;
-use pendularm::protocol::messages;
 use pendularm::services::Address;
 use pendularm::services::goals::GoalRequest;
 use pendularm::services::trial::{
@@ -133,9 +132,7 @@ impl<const N: usize> Kernel<N> {
         let status = self.trial.status();
         if let Some(status) = status.filter(|_| self.arm.world().wants(topic)) {
             let message = status_message(&status);
-            self.arm
-                .world()
-                .publish(topic, move || messages::publish(topic.name(), &message));
+            self.arm.publish(topic, move || message);
         }
     }
 }

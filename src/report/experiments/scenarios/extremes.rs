@@ -314,7 +314,7 @@ fn changes() -> Observation {
 
 fn there_and_back() -> Observation {
     each(Method::ALL.map(|method| {
-        let [_, coarse, fine] = [125, 250, 500].map(|steps| {
+        let [coarse, fine] = [250, 500].map(|steps| {
             let start = State {
                 position: [0.5, -0.5],
                 velocity: [0.2, 0.4],
