@@ -3,7 +3,7 @@
 // Invariant: while aiming, one request is sent at a time, at a bounded rate, and the last position is always sent.
 
 import { warn } from "./dom.js";
-import { endEffector, showAim, toWorld } from "./arm_view.js";
+import { endEffector, rounded, showAim, toWorld } from "./arm_view.js";
 import { goalOptions, showGoalPlace, showGoalRefusal } from "./tasks_panel.js";
 import { inPageNames } from "./format.js";
 import { latestOnly } from "./latest.js";
@@ -112,40 +112,35 @@ function modeOf(event) {
 }
 
 /** Whether a touch is on the end effector. */
-function isOnEnd(canvas, { clientX, clientY }) {
+function isOnEnd({ clientX, clientY }) {
   if (state.links === 0) return false;
-  const box = canvas.getBoundingClientRect();
-  const { x, y } = toWorld(clientX - box.left, clientY - box.top);
+  const { x, y } = toWorld({ clientX, clientY });
   const end = endEffector();
-  const edge = toWorld(clientX - box.left + FINGER_PX, clientY - box.top).x - x; // the same way in metres
+  const edge = toWorld({ clientX: clientX + FINGER_PX, clientY }).x - x; // the same way in metres
   return Math.hypot(x - end.x, y - end.y) < edge;
 }
 
 export function startAim(canvas) {
-  const place = (event) => {
-    const box = canvas.getBoundingClientRect();
-    return toWorld(event.clientX - box.left, event.clientY - box.top);
-  };
   // A finger that starts on the end effector drags it. Elsewhere it scrolls the page, and a tap chooses the position.
   let tap = null;
-  canvas.addEventListener("touchstart", (event) => { if (isOnEnd(canvas, event.touches[0])) event.preventDefault(); }, { passive: false });
+  canvas.addEventListener("touchstart", (event) => { if (isOnEnd(event.touches[0])) event.preventDefault(); }, { passive: false });
   canvas.addEventListener("pointerdown", (event) => {
     if (event.button !== 0 || state.links === 0) return;
     tap = null;
-    if (event.pointerType === "touch" && !isOnEnd(canvas, event)) {
+    if (event.pointerType === "touch" && !isOnEnd(event)) {
       tap = event;
       return;
     }
     pointer = event.pointerId;
     canvas.setPointerCapture(pointer);
-    moveTo(place(event), modeOf(event));
+    moveTo(toWorld(event), modeOf(event));
   });
   canvas.addEventListener("pointermove", (event) => {
-    if (event.pointerId === pointer) moveTo(place(event), event.shiftKey ? "setpoint" : aim.mode);
+    if (event.pointerId === pointer) moveTo(toWorld(event), event.shiftKey ? "setpoint" : aim.mode);
   });
   canvas.addEventListener("pointerup", (event) => {
     const isTap = tap?.pointerId === event.pointerId && Math.hypot(event.clientX - tap.clientX, event.clientY - tap.clientY) < TAP_PX;
-    if (isTap) moveTo(place(event), modeOf(event));
+    if (isTap) moveTo(toWorld(event), modeOf(event));
     if (isTap || event.pointerId === pointer) end();
   });
   canvas.addEventListener("pointercancel", (event) => { if (event.pointerId === pointer) end(); });
@@ -159,8 +154,7 @@ function arrows(event) {
   event.preventDefault();
   const mode = modeOf(event);
   const from = aim ?? (state.goal && mode === "goal" ? state.goal.target : endEffector());
-  const round = (value) => Math.round(value * 1e4) / 1e4;
-  moveTo({ x: round(from.x + ARROW_M * way[0]), y: round(from.y + ARROW_M * way[1]) }, mode);
+  moveTo({ x: rounded(from.x + ARROW_M * way[0]), y: rounded(from.y + ARROW_M * way[1]) }, mode);
   clearTimeout(settle);
   settle = setTimeout(end, SETTLE_MS);
 }

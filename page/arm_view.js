@@ -89,10 +89,15 @@ function resized() {
   redraw();
 }
 
-/** Metres from the base for a position on the canvas in CSS pixels, rounded to a tenth of a millimetre. */
-export function toWorld(px, py) {
-  const round = (value) => Math.round(value * 1e4) / 1e4;
-  return { x: round((px - surface.width / 2) / scale), y: round((surface.height / 2 - py) / scale) };
+/** Rounded to a tenth of a millimetre. */
+export function rounded(metres) {
+  return Math.round(metres * 1e4) / 1e4;
+}
+
+/** Metres from the base for a position in the window, as of a pointer. */
+export function toWorld({ clientX, clientY }) {
+  const { left, top } = surface.canvas.getBoundingClientRect();
+  return { x: rounded((clientX - left - surface.width / 2) / scale), y: rounded((surface.height / 2 - clientY + top) / scale) };
 }
 
 /** The position of the end effector [m]. */

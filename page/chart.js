@@ -10,6 +10,7 @@ import { colors } from "./theme.js";
 
 /** @typedef {import("./scale.js").Scale} Scale */
 /** @typedef {{width?: number, dash?: number[], alpha?: number}} Style */
+/** @typedef {import("./surface.js").Surface} Surface */
 
 const SOLID = /** @type {number[]} */ ([]);
 export const DASHED = [5, 4];
@@ -74,8 +75,8 @@ export function write(context, text, x, y, align, color = colors.muted, font = T
 export const ROOMY = { left: 78, right: 16, top: 16, bottom: 40, font: TEXT };
 
 export class Chart {
-  /** @param {any} context @param {number} width @param {number} height @param {Scale} across @param {Scale} up */
-  constructor(context, width, height, across, up, { left = 46, right = 8, top = 6, bottom = 16, font = SMALL } = {}) {
+  /** @param {Surface} surface @param {Scale} across @param {Scale} up */
+  constructor({ context, width, height }, across, up, { left = 46, right = 8, top = 6, bottom = 16, font = SMALL } = {}) {
     this.context = context;
     this.width = width;
     this.height = height;
@@ -228,8 +229,6 @@ export function drawMap(chart, rows, at, factor) {
   circle(context, chart.x(across.within(at)), chart.y(up.within(factor)), 7, colors.accent, colors.panel, 2);
 }
 
-/** @typedef {import("./surface.js").Surface} Surface */
-
 /** Largest thickness of a long bar [px]. */
 const THICK = 40;
 const NONE = { place: () => 0, marks: [] };
@@ -237,33 +236,33 @@ const ERRORS = new LogScale(1e-10, 1, []);
 ERRORS.marks = ERRORS.powers(6, (value) => (value === 1 ? "1" : powerOfTen(value)));
 
 /** A bar for each control step; negative ones are red. @param {Surface} surface @param {number[]} bars speed at each step [rad/s] */
-export function drawBars({ context, width, height }, bars, name = "measurement of the controller") {
+export function drawBars(surface, bars, name = "measurement of the controller") {
   const largest = Math.max(...bars.map(Math.abs));
   if (!(largest > 0)) return;
   const up = { place: (/** @type {number} */ value) => 0.5 + (0.46 * value) / largest, marks: /** @type {[number, string][]} */ ([1, 0, -1].map((part) => [part * largest, significant(part * largest, 2)])) };
   const across = { place: (/** @type {number} */ k) => (k + 0.5) / bars.length, marks: /** @type {[number, string][]} */ (bars.flatMap((_, k) => (k % 2 === 0 ? [[k, String(k + 1)]] : []))) };
-  const chart = new Chart(context, width, height, across, up, ROOMY);
+  const chart = new Chart(surface, across, up, ROOMY);
   chart.frame({ across: name, up: "speed [rad/s]", grid: "rows" });
   const wide = (0.7 * (chart.right - chart.left)) / bars.length;
   bars.forEach((bar, k) => {
-    context.fillStyle = bar >= 0 ? colors.accent : colors.bad;
+    chart.context.fillStyle = bar >= 0 ? colors.accent : colors.bad;
     const [y, zero] = [chart.y(bar), chart.y(0)];
-    context.fillRect(chart.x(k) - wide / 2, Math.min(y, zero), wide, Math.max(1, Math.abs(y - zero)));
+    chart.context.fillRect(chart.x(k) - wide / 2, Math.min(y, zero), wide, Math.max(1, Math.abs(y - zero)));
   });
 }
 
 /** The errors of the method and of the hold, as two bars on one fixed scale. @param {Surface} surface @param {{error: number | null, sampling: number | null} | null} errors */
-export function drawErrors({ context, width, height }, errors) {
+export function drawErrors(surface, errors) {
   if (!errors) return;
-  const chart = new Chart(context, width, height, ERRORS, NONE, ROOMY);
+  const chart = new Chart(surface, ERRORS, NONE, ROOMY);
   chart.frame({ across: "largest error of a joint on the move [rad]" });
   const rows = /** @type {const} */ ([["the method", errors.error, colors.accent], ["the hold", errors.sampling, colors.bad]]);
   const room = (chart.bottom - chart.top) / rows.length;
   rows.forEach(([name, value, color], k) => {
     const y = chart.top + k * room;
     chart.words(`Error of ${name}: ${value === null ? "not known" : `${significant(value, 2)} rad`}`, chart.left + 6, y + 14, "left");
-    context.fillStyle = color;
-    if (value !== null && value > 0) context.fillRect(chart.left, y + 28, Math.max(2, chart.x(ERRORS.within(value)) - chart.left), Math.min(THICK, Math.max(10, room - 48)));
+    chart.context.fillStyle = color;
+    if (value !== null && value > 0) chart.context.fillRect(chart.left, y + 28, Math.max(2, chart.x(ERRORS.within(value)) - chart.left), Math.min(THICK, Math.max(10, room - 48)));
   });
 }
 

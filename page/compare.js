@@ -51,10 +51,7 @@ export function startCompare() {
     ["energy", (surface) => drawLines(surface, (run) => run.times, ({ energy }) => energy, new Axis(3, 0.1, 5000))],
     ["angle", (surface) => drawLines(surface, () => instants, ({ poses }) => poses.map((q) => (q ? q[state.joint] : null)), new Axis(3, 0.1, 300))],
   ]);
-  surfaces = pictures.map(([id, paint]) => {
-    const surface = new Surface(byId(`compare-${id}`), () => { if (instants.length > 0) paint(surface); });
-    return surface;
-  });
+  surfaces = pictures.map(([id, paint]) => new Surface(byId(`compare-${id}`), (surface) => { if (instants.length > 0) paint(surface); }));
   watch("links", () => { byId("compare-result").hidden = true; });
   watch("joint", redraw);
   byId("compare-scrub").addEventListener("input", ({ target }) => {
@@ -191,12 +188,12 @@ function errorScale() {
 }
 
 /** @param {Surface} surface @param {(run: any) => number[]} timesOf @param {(run: any) => (number | null)[]} valuesOf @param {any} scale */
-function drawLines({ context, width, height }, timesOf, valuesOf, scale) {
+function drawLines(surface, timesOf, valuesOf, scale) {
   if (scale instanceof Axis) {
     const values = runs.flatMap(valuesOf).filter((one) => one !== null && !Number.isNaN(one));
     scale.fit(Math.min(...values), Math.max(...values));
   }
-  const chart = new Chart(context, width, height, times(0, instants.at(-1) ?? SECONDS), scale, ROOM);
+  const chart = new Chart(surface, times(0, instants.at(-1) ?? SECONDS), scale, ROOM);
   chart.frame();
   chart.inside(() => {
     for (const run of runs) {

@@ -240,7 +240,7 @@ function gallery(links) {
   galleries[links] ??= el("div", { class: "pictures" }, ...SCENES.map((scene) => {
     const canvas = el("canvas", { "aria-hidden": "true" });
     const { text, act } = offer(scene, links);
-    const picture = new Surface(canvas, () => drawPicture(picture, scene));
+    new Surface(canvas, (surface) => drawPicture(surface, scene));
     return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: act === null, onclick: act }, canvas, el("span", {}, scene.name), el("small", {}, text));
   }));
   return galleries[links];
@@ -482,12 +482,12 @@ function strip(series) {
   const chart = new StripChart(series, 0.2, 300);
   return () => {
     stripTime = newest();
-    chart.draw(surface.context, surface.width, surface.height, { now: stripTime || 0, span: SPAN, links: state.links, shown: ALL_JOINTS, across: "simulation time [s]" });
+    chart.draw(surface, { now: stripTime || 0, span: SPAN, links: state.links, shown: ALL_JOINTS, across: "simulation time [s]" });
   };
 }
 
 function paintMap() {
-  const chart = new Chart(surface.context, surface.width, surface.height, PERIODS, FACTORS, ROOMY);
+  const chart = new Chart(surface, PERIODS, FACTORS, ROOMY);
   chart.frame({ across: "control period", up: "damping gains", grid: false });
   drawMap(chart, now.border, period(), damping());
 }

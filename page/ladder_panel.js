@@ -27,7 +27,7 @@ let asked = ""; // the settings of `found`
 let running = 0; // the number of started measurements; only the newest continues
 
 export function startLadder() {
-  surface = new Surface(byId("ladder"), () => drawLadder(surface, found));
+  surface = new Surface(byId("ladder"), (one) => drawLadder(one, found));
   said = panel(byId("ladder-form"), [seconds], [["Measure", () => busy(said.buttons[0], "Measuring…", measure), { type: "submit", class: "primary" }]]);
   setText(byId("ladder-text"), INVITATION);
   // The measurement belongs to another loop.
@@ -96,11 +96,12 @@ const ROOM = { left: 62, right: 14, top: 30, bottom: 36, font: TEXT };
 const CROSS = 4;
 
 /** @param {import("./surface.js").Surface} surface @param {Rung[]} found */
-export function drawLadder({ context, width, height }, found) {
+export function drawLadder(surface, found) {
+  const { context, width, height } = surface;
   const runs = found.filter(({ wall }) => wall > 0);
   const errors = runs.flatMap(({ error, sampling }) => [error ?? 0, sampling ?? 0]).filter((error) => error > 0);
   if (errors.length === 0) return write(context, "no measurement yet", width / 2, height / 2, "center");
-  const chart = new Chart(context, width, height, LogScale.around(runs.map(({ wall }) => wall), 6, duration), LogScale.around(errors, 8, powerOfTen), ROOM);
+  const chart = new Chart(surface, LogScale.around(runs.map(({ wall }) => wall), 6, duration), LogScale.around(errors, 8, powerOfTen), ROOM);
   chart.frame({ across: "run time", up: "error [rad]" });
   METHODS.forEach(([method], i) => {
     const color = colors.methods[i];

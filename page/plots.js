@@ -30,10 +30,7 @@ let cursor = NaN; // the time under the pointer [s, simulation time]; NaN withou
 let legends = [];
 
 export function startPlots() {
-  plots = CHARTS.map(([id, chart]) => {
-    const surface = new Surface(byId(`plot-${id}`), () => chart.draw(surface.context, surface.width, surface.height, view(id)));
-    return { chart, surface };
-  });
+  plots = CHARTS.map(([id, chart]) => ({ chart, surface: new Surface(byId(`plot-${id}`), (surface) => chart.draw(surface, view(id))) }));
   for (const { chart, surface: { canvas } } of plots.slice(0, 4)) {
     canvas.addEventListener("pointermove", (event) => hover(chart.timeAt(event.offsetX)));
     canvas.addEventListener("pointerleave", () => hover(NaN));

@@ -15,6 +15,8 @@ import { duration, fixed, methodName, METHODS, significant } from "./format.js";
  * @property {boolean} slow whether the verdict is for a control period longer than the timestep
  */
 
+/** Below this real-time factor the runtime is too slow. */
+export const SLOW = 0.95;
 /** Advised share of a limit, as in the runtime. */
 const SHARE = 0.8;
 /** Advised share of a timestep at which the arm diverged below every known limit. */

@@ -4,12 +4,9 @@
 import { byId, setAttribute, setText } from "./dom.js";
 import { fixed, significant } from "./format.js";
 import { endEffector } from "./arm_view.js";
-import { answerInForce, doublingTime, limitInForce, limitText, verdict } from "./policy.js";
+import { answerInForce, doublingTime, limitInForce, limitText, SLOW, verdict } from "./policy.js";
 import { isAlone } from "./kernel.js";
 import { LOOP, state, watch } from "./store.js";
-
-/** Below this real-time factor the runtime is too slow. */
-const LAGS = 0.95;
 
 export function startReadouts() {
   watch("connection", (now) => {
@@ -28,7 +25,7 @@ export function showReadouts() {
   setAttribute(byId("run-state"), "class", `state ${diagnostics?.state === "diverged" ? "diverged" : ""}`);
   const factor = diagnostics?.real_time_factor ?? NaN;
   setText(byId("out-rtf"), state.paused ? "paused" : `${fixed(factor, 2)}×`);
-  byId("out-rtf").classList.toggle("warn", !state.paused && diagnostics?.state === "running" && factor < LAGS);
+  byId("out-rtf").classList.toggle("warn", !state.paused && diagnostics?.state === "running" && factor < SLOW);
 }
 
 function runState() {

@@ -41,7 +41,7 @@ export function startStability() {
   watch(["integrator", "gains", "params", "setpoint", "limits", "enabled", "tab", "links"], () => map.redraw());
   canvas.addEventListener("click", (event) => goTo(event.offsetX, event.offsetY));
   canvas.addEventListener("keydown", byArrows);
-  bars = new Surface(byId("push-bars"), () => drawBars(bars, heights, state.enabled ? "measurement of the controller" : "step"));
+  bars = new Surface(byId("push-bars"), (surface) => drawBars(surface, heights, state.enabled ? "measurement of the controller" : "step"));
   watch([...LOOP, "tab", "view"], lookAtPush);
 }
 
@@ -73,8 +73,7 @@ async function askBorder() {
 
 function drawStability() {
   askBorder();
-  const { context, width, height } = map;
-  chart = new Chart(context, width, height, timesteps, factors, { right: 10, top: 8, bottom: 36 });
+  chart = new Chart(map, timesteps, factors, { right: 10, top: 8, bottom: 36 });
   chart.frame({ across: "timestep", grid: false });
   const factor = factorOf(state.gains, anchor);
   if (state.integrator && state.gains) drawMap(chart, rows, state.integrator.timestep, factor > 0 ? factor : 1);

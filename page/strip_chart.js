@@ -7,6 +7,7 @@ import { ENERGY, firstAfter, KINETIC, POSITION, POTENTIAL, record, TIME, VELOCIT
 import { Axis, LOG_END, times } from "./scale.js";
 import { colors } from "./theme.js";
 
+/** @typedef {import("./surface.js").Surface} Surface */
 /** @typedef {{column: number, dashed?: boolean, color?: string, name?: string}} Series of each joint, or one with its own colour and name */
 
 /** @type {Series[]} */
@@ -44,10 +45,10 @@ export class StripChart {
   /**
    * Draws `span` seconds up to `now`, for the joints that are `shown`, with a mark at `cursor`, a reference level, and
    * a name of the time axis.
-   * @param {any} context @param {number} width @param {number} height @param {{now: number, span: number, links:
-   * number, shown: boolean[], cursor?: number, level?: number, across?: string}} what
+   * @param {Surface} surface @param {{now: number, span: number, links: number, shown: boolean[], cursor?: number,
+   * level?: number, across?: string}} what
    */
-  draw(context, width, height, { now, span, links, shown, cursor = NaN, level = NaN, across = "" }) {
+  draw(surface, { now, span, links, shown, cursor = NaN, level = NaN, across = "" }) {
     this.from = now - span;
     this.span = span;
     const first = Math.max(0, firstAfter(this.from) - 1);
@@ -58,7 +59,7 @@ export class StripChart {
     this.axis.fit(level < min ? level : min, level > max ? level : max);
     const leftAt = this.leftAt(lines, first, last);
     const named = lines.filter(({ name }) => name);
-    const chart = new Chart(context, width, height, times(this.from, now), this.axis, { ...(named.length > 0 && { top: 18 }), ...(across && { bottom: 36 }) });
+    const chart = new Chart(surface, times(this.from, now), this.axis, { ...(named.length > 0 && { top: 18 }), ...(across && { bottom: 36 }) });
     this.chart = chart;
     chart.frame({ across });
     const { data } = record;
@@ -105,14 +106,14 @@ export class PhasePlot {
     this.axis = new Axis(4, 0.5, SANE);
   }
 
-  /** @param {any} context @param {number} width @param {number} height @param {{now: number, span: number, links: number, shown: boolean[], cursor?: number}} what */
-  draw(context, width, height, { now, span, links, shown, cursor = NaN }) {
+  /** @param {Surface} surface @param {{now: number, span: number, links: number, shown: boolean[], cursor?: number}} what */
+  draw(surface, { now, span, links, shown, cursor = NaN }) {
     const first = firstAfter(now - span);
     const last = Math.min(record.length, firstAfter(now) + 1);
     const joints = Array.from({ length: links }, (_, joint) => joint).filter((joint) => shown[joint]);
     this.across.fit(...extent(joints.map((joint) => POSITION + joint), first, last));
     this.axis.fit(...extent(joints.map((joint) => VELOCITY + joint), first, last));
-    const chart = new Chart(context, width, height, this.across, this.axis, { right: 10, top: 8, bottom: 36 });
+    const chart = new Chart(surface, this.across, this.axis, { right: 10, top: 8, bottom: 36 });
     chart.frame({ across: "position [rad]" });
     const at = Number.isFinite(cursor) ? Math.min(firstAfter(cursor), record.length - 1) : last - 1;
     if (last - 1 > first) chart.inside(() => { for (const joint of joints) drawPath(chart, joint, first, last - 1, record.at(at)); });

@@ -12,9 +12,9 @@ const paper = matchMedia("print");
 
 export class Surface {
   /**
-   * @param {HTMLCanvasElement} canvas @param {() => void} paint paints everything on an empty
-   * canvas; not called while the canvas is hidden @param {() => void} [resized] called at a new
-   * size or theme; by default the canvas is painted again
+   * @param {HTMLCanvasElement} canvas @param {(surface: Surface) => void} paint paints everything on
+   * this empty surface; not called while the canvas is hidden @param {() => void} [resized] called at
+   * a new size or theme; by default the canvas is painted again
    */
   constructor(canvas, paint, resized) {
     this.canvas = canvas;
@@ -28,7 +28,7 @@ export class Surface {
       if (!this.stale || this.width === 0) return false;
       this.stale = false;
       this.clear();
-      paint();
+      paint(this);
       return false;
     });
     onTheme(() => this.onResize());

@@ -6,12 +6,9 @@ import { switchController, takeSuggestion } from "./controls.js";
 import { announce, byId, el, passFocus, setText, warn } from "./dom.js";
 import { refusal } from "./field.js";
 import { duration, fixed } from "./format.js";
-import { limitInForce, verdict } from "./policy.js";
+import { limitInForce, SLOW, verdict } from "./policy.js";
 import { pause, setPeriod, step } from "./runtime.js";
 import { LOOP, state, watch } from "./store.js";
-
-/** Below this real-time factor a warning of the runtime is about its speed. */
-const SLOW = 0.95;
 
 let said;
 let shownNotice = "";
@@ -24,7 +21,6 @@ export function startTransport() {
   byId("reset").addEventListener("click", () => said.report(resetArm()));
   watch("paused", (paused) => {
     setText(byId("pause-text"), paused ? "Run" : "Pause");
-    byId("pause").classList.toggle("is-paused", paused === true);
     announce(paused ? "Paused." : "Running.");
   });
   watch([...LOOP, "goal", "trial"], showNotice);

@@ -4,15 +4,18 @@
 Both runs come from /study/rollout of the built program (PENDULARM, or target/release/pendularm). usage: scripts/swing.py [FILE]
 """
 
-import json
 import math
 import os
 import pathlib
-import socket
-import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+os.environ.setdefault("PENDULARM", str(ROOT / "target" / "release" / "pendularm"))
+sys.path.insert(0, str(ROOT / "tests" / "browser"))
+sys.dont_write_bytecode = True
+
+from runtime import Runtime  # noqa: E402
+
 PERIODS = [0.003, 0.0055]  # s; the stretched default arm is stable up to 4.32 ms
 SECONDS, FRAMES = 2.4, 73
 START, SETPOINT = [-1.2, 0.6], [0.0, 0.0]
@@ -20,15 +23,12 @@ GAINS = {"kp": [1000, 250], "ki": [3000, 750], "kd": [110, 22]}
 SIZE, REACH = 320, 66  # paper of one arm, and a link's length on it
 
 
-def runs(address):
-    with socket.create_connection(address) as stream, stream.makefile() as lines:
-        for period in PERIODS:
-            args = {"q0": START, "setpoint": SETPOINT, "gains": GAINS, "integrator": "rk4", "timestep": period / 3,
-                    "control_period": period, "duration": SECONDS, "samples": FRAMES}
-            stream.sendall(json.dumps({"op": "call_service", "service": "/study/rollout", "args": args}).encode() + b"\n")
-            answer = json.loads(lines.readline())
-            assert answer["result"], answer
-            yield period, answer["values"]["positions"]
+def run(runtime, period):
+    """The joint positions of a frame each."""
+    answer = runtime.call("/study/rollout", q0=START, setpoint=SETPOINT, gains=GAINS, integrator="rk4", timestep=period / 3,
+                          control_period=period, duration=SECONDS, samples=FRAMES)
+    assert answer["result"], answer
+    return answer["values"]["positions"]
 
 
 def arm(period, positions, left):
@@ -56,14 +56,8 @@ def arm(period, positions, left):
 
 
 def main():
-    program = os.environ.get("PENDULARM", ROOT / "target" / "release" / "pendularm")
-    served = subprocess.Popen([program, "--bind", "127.0.0.1:0", "--log", "off"], stdout=subprocess.PIPE, text=True)
-    try:
-        port = int(served.stdout.readline().rsplit(":", 1)[1])
-        arms = [arm(period, positions, SIZE * index) for index, (period, positions) in enumerate(runs(("127.0.0.1", port)))]
-    finally:
-        served.terminate()
-        served.wait()
+    with Runtime() as runtime:
+        arms = [arm(period, run(runtime, period), SIZE * index) for index, period in enumerate(PERIODS)]
     style = ("text{font:15px system-ui,sans-serif;fill:#566375}line{stroke-width:9;stroke-linecap:round}"
              ".one{stroke:#2563c9}.two{stroke:#b3500a}.goal{stroke:#c3ccd8;stroke-width:9;stroke-linecap:round;fill:none}circle{fill:#566375}")
     file = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "swing.svg"

@@ -168,14 +168,10 @@ def test_arrays_come_out_without_copies_and_cannot_be_written(links):
             getattr(batch, name)[0] = 1
 
 
-def test_arrays_go_in_as_they_lie():
+def test_a_batchs_own_arrays_go_in():
     batch, other = pendularm.Batch(4), pendularm.Batch(4)
-    effort = np.arange(16.0).reshape(4, 4)[:, ::2]
-    assert not effort.flags.c_contiguous
-    batch.step(5, effort)
-    other.step(5, effort.tolist())
-    assert batch.position.tolist() == other.position.tolist()
-    # A batch's own arrays too.
+    for one in [batch, other]:
+        one.set_state(np.arange(8.0).reshape(4, 2))
     batch.step(2, batch.position)
     other.step(2, other.position.copy())
     assert batch.velocity.tolist() == other.velocity.tolist()

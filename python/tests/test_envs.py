@@ -49,17 +49,6 @@ def test_the_vector_environment_is_as_many_single_ones(name, links):
     theirs.close()
 
 
-def test_an_arm_is_the_same_among_few_and_among_many(name):
-    few, many = gymnasium.make_vec(name, 4), gymnasium.make_vec(name, 600)
-    first, others = few.reset(seed=3)[0], many.reset(seed=3)[0]
-    assert np.array_equal(first, others[:4])
-    actions = np.random.default_rng(1).uniform(-1, 1, (600, 2)).astype(np.float32)
-    for _ in range(20):
-        found, among = few.step(actions[:4]), many.step(actions)
-        assert np.array_equal(found[0], among[0][:4])
-        assert np.array_equal(found[1], among[1][:4])
-
-
 def test_the_action_of_an_arm_that_has_ended_is_ignored(name):
     one, other = (gymnasium.make_vec(name, 3, max_episode_steps=2) for _ in range(2))
     for env in (one, other):

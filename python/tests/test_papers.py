@@ -30,14 +30,7 @@ def test_the_readmes_plot_is_drawn(tmp_path):
 
 
 def test_each_part_of_the_manual_runs_by_itself(tmp_path):
-    for part in blocks(MANUAL):
-        run(part, tmp_path)
-
-
-def test_the_manual_runs_from_top_to_bottom(tmp_path):
-    parts = blocks(MANUAL)
-    assert len(parts) >= 3
-    said = run("\n".join(parts), tmp_path)
+    said = "".join(run(part, tmp_path) for part in blocks(MANUAL))
     assert "(20, 20, 2)" in said
     assert len(list((tmp_path / "gains").glob("*.npz"))) == 1
 

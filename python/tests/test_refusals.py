@@ -1,6 +1,5 @@
 """A wrong value is refused by the name of its field, and changes nothing: the rows of refusals.txt."""
 
-import fractions
 import math
 import pathlib
 
@@ -11,14 +10,7 @@ import pendularm
 
 HIDDEN = np.ma.array([1.0, 2.0], mask=[True, False])
 ROWS = (pathlib.Path(__file__).parent / "refusals.txt").read_text(encoding="utf-8").splitlines()
-NAMES = {**vars(pendularm), "HIDDEN": HIDDEN, "fractions": fractions, "math": math, "np": np, "pathlib": pathlib}
-
-
-def among_objects(*values):
-    """The values, unchanged, in an array."""
-    array = np.empty(len(values), object)
-    array[:] = values
-    return array
+NAMES = {**vars(pendularm), "HIDDEN": HIDDEN, "math": math, "np": np, "pathlib": pathlib}
 
 
 def state(arm, batch):
@@ -31,7 +23,7 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(row):
     wrong, said = row.split(" => ")
     arm, batch = pendularm.Simulation(), pendularm.Batch(3)
     before = state(arm, batch)
-    names = {**NAMES, "among_objects": among_objects, "arm": arm, "batch": batch}
+    names = {**NAMES, "arm": arm, "batch": batch}
     with pytest.raises(ValueError) as refusal:
         eval(wrong, names)
     found = str(refusal.value)

@@ -183,16 +183,6 @@ def test_the_mapping_of_the_gains_can_be_handed_in_but_not_written():
     assert pendularm.rollout(duration=0.1, gains=arm.gains).evaluations == 400
 
 
-def test_a_settled_arm_carries_its_gravity_load(links):
-    arm = pendularm.Simulation(pendularm.Arm(links))
-    arm.enable()
-    arm.set_setpoint([0.5, -0.8, 0.3][:links])
-    arm.step(20_000)
-    assert np.allclose(arm.position, [0.5, -0.8, 0.3][:links], atol=1e-6)
-    # After 20 s the integrals still differ by some millionths of the load.
-    assert np.allclose(arm.effort, dynamics.gravity_load(arm.arm, arm.position), rtol=1e-4)
-
-
 def test_a_divergence_is_shown_and_a_reset_clears_it():
     arm = pendularm.Simulation(method="euler", timestep=0.1)
     arm.enable()

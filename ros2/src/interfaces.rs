@@ -188,18 +188,6 @@ mod tests {
 
     use super::*;
 
-    /// From `rmw_zenoh`'s design document.
-    #[test]
-    fn a_service_has_the_hash_that_ros_2_has() {
-        let two = [field("a", "int64"), field("b", "int64")];
-        let sum = [field("sum", "int64")];
-        let one = ServiceInterface::new("example_interfaces/srv/AddTwoInts", &two, &sum);
-        assert_eq!(
-            one.hash,
-            "RIHS01_e118de6bf5eeb66a2491b5bda11202e7b68f198d6f67922cf30364858239c81a"
-        );
-    }
-
     /// From the code that ROS 2 generates for them.
     #[test]
     fn services_of_ros_2_have_its_hashes() {

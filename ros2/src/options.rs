@@ -163,9 +163,4 @@ mod tests {
             assert_eq!(address(wrong), None, "{wrong}");
         }
     }
-
-    #[test]
-    fn the_command_line_is_whole() {
-        command().debug_assert();
-    }
 }

@@ -133,13 +133,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn types_of_others_are_not_written() {
-        let texts = interfaces();
-        let mut paths = texts.keys();
-        let known = ["action/", "msg/", "srv/"];
-        assert!(paths.all(|path| known.iter().any(|kind| path.starts_with(kind))));
-        assert!(!texts.contains_key("msg/JointState.msg"));
-    }
 }

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["fingerprint"]
-
 
 def fingerprint(name: str, function: Callable[..., Any]) -> str:
     """A hash of the function's code, with its defaults and its closure.

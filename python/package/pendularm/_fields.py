@@ -11,19 +11,6 @@ from numpy.typing import NDArray
 
 from ._native import as_doubles, is_masked, is_too_long
 
-__all__ = [
-    "Floats",
-    "as_array",
-    "flag",
-    "is_masked",
-    "number",
-    "numbers",
-    "path",
-    "read_seeds",
-    "shown",
-    "whole_number",
-]
-
 Floats = NDArray[np.float64]
 
 

@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Folder", "PieceResults", "hand_out"]
-
 PieceResults = dict[str, NDArray[Any]]
 """The results of a piece by the metrics' names, each (arms,)."""
 

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from ._fields import shown
 from ._tasks import STEP, Task
 
-__all__ = ["METADATA", "Frame", "Renderer"]
-
 Frame = NDArray[np.uint8]
 
 METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": round(1 / STEP)}

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ._fields import flag, is_masked, numbers, shown
-from ._native import Batch
+from ._fields import flag, numbers, shown
+from ._native import Batch, is_masked
 
 TRIED_AT_ONCE = 16_384
 """Values of a setting that one `Batch` checks before the sweep begins."""

@@ -11,8 +11,6 @@ from . import dynamics
 from ._fields import Floats, number, shown
 from ._native import Arm, Batch
 
-__all__ = ["STEP", "TIMESTEP", "Action", "Floats", "Observation", "Reach", "SwingUp", "Task"]
-
 Observation = NDArray[np.float32]
 Action = NDArray[np.float32]
 

@@ -20,9 +20,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ._fields import as_array, is_masked, read_seeds, shown, whole_number
+from ._fields import Floats, as_array, read_seeds, shown, whole_number
+from ._native import is_masked
 from ._render import METADATA, Frame, Renderer
-from ._tasks import TIMESTEP, Action, Floats, Observation, Reach, SwingUp, Task
+from ._tasks import TIMESTEP, Action, Observation, Reach, SwingUp, Task
 
 __all__ = [
     "PendularmEnv",

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._code import fingerprint
-from ._fields import Floats, flag, is_masked, number, path, shown, whole_number
-from ._native import Batch
+from ._fields import Floats, flag, number, path, shown, whole_number
+from ._native import Batch, is_masked
 from ._pieces import Folder, PieceResults, hand_out
 from ._settings import begin, column, try_values
 

@@ -59,6 +59,32 @@ pub(crate) struct Batch {
     turns: Turns,
 }
 
+/// Changes every arm of a batch, with its row, in this thread's turn.
+macro_rules! for_each_arm {
+    ($batch:ident, $py:ident, ($row:ident, $one:ident) => $change:block) => {{
+        let _turn = $batch.turns.take($py)?;
+        for_either!(&$batch.own, lanes => {
+            for ($row, $one) in hold($py, lanes).iter_mut().enumerate() $change
+        });
+        Ok(())
+    }};
+}
+
+/// Changes arms of a batch in this thread's turn, and updates the users' arrays.
+macro_rules! change_shown {
+    ($batch:ident, $py:ident, $lanes:ident => $change:block) => {{
+        let _turn = $batch.turns.take($py)?;
+        for_either!(&$batch.own, lanes => {
+            let mut lanes = hold($py, lanes);
+            let $lanes = lanes.as_mut_slice();
+            $batch.windows.write($py, |shown| {
+                $change
+                shown.show($lanes);
+            })
+        })
+    }};
+}
+
 impl Batch {
     /// A row per arm, or one for all, if there is an argument.
     fn rows<'a>(
@@ -148,18 +174,12 @@ impl Batch {
     #[pyo3(signature = (arms=None))]
     fn reset(&self, py: Python<'_>, arms: Option<&Object<'_>>) -> PyResult<()> {
         let chosen = chosen(arms, self.arms)?;
-        let _turn = self.turns.take(py)?;
-        for_either!(&self.own, lanes => {
-            let mut lanes = hold(py, lanes);
-            let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| {
-                for &lane in &chosen {
-                    if let Some(one) = lanes.get_mut(lane) {
-                        one.reset();
-                    }
+        change_shown!(self, py, lanes => {
+            for &lane in &chosen {
+                if let Some(one) = lanes.get_mut(lane) {
+                    one.reset();
                 }
-                shown.show(lanes);
-            })
+            }
         })
     }
 
@@ -181,21 +201,15 @@ impl Batch {
             .as_ref()
             .map(|given| given.rows(Some(chosen.len()), self.links(), Bound::Finite))
             .transpose()?;
-        let _turn = self.turns.take(py)?;
-        for_either!(&self.own, lanes => {
-            let mut lanes = hold(py, lanes);
-            let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| {
-                for (row, &lane) in chosen.iter().enumerate() {
-                    if let Some(one) = lanes.get_mut(lane) {
-                        one.set_state(State {
-                            position: position.row(row),
-                            velocity: velocity.as_ref().map_or([0.0; _], |velocity| velocity.row(row)),
-                        });
-                    }
+        change_shown!(self, py, lanes => {
+            for (row, &lane) in chosen.iter().enumerate() {
+                if let Some(one) = lanes.get_mut(lane) {
+                    one.set_state(State {
+                        position: position.row(row),
+                        velocity: velocity.as_ref().map_or([0.0; _], |velocity| velocity.row(row)),
+                    });
                 }
-                shown.show(lanes);
-            })
+            }
         })
     }
 
@@ -211,16 +225,12 @@ impl Batch {
         let positions = positions.rows(Some(self.arms), self.links(), Bound::Finite)?;
         let velocities = read("velocities", velocities)?;
         let velocities = self.rows(velocities.as_ref(), Bound::Finite)?;
-        let _turn = self.turns.take(py)?;
-        for_either!(&self.own, lanes => {
-            for (row, one) in hold(py, lanes).iter_mut().enumerate() {
-                one.set_setpoint(Setpoint {
-                    position: positions.row(row),
-                    velocity: velocities.as_ref().map_or([0.0; _], |velocities| velocities.row(row)),
-                });
-            }
-        });
-        Ok(())
+        for_each_arm!(self, py, (row, one) => {
+            one.set_setpoint(Setpoint {
+                position: positions.row(row),
+                velocity: velocities.as_ref().map_or([0.0; _], |velocities| velocities.row(row)),
+            });
+        })
     }
 
     /// Changes the given gains: `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad]. The integrals do not change.
@@ -236,18 +246,14 @@ impl Batch {
         let kp = self.rows(kp.as_ref(), Bound::NotNegative)?;
         let ki = self.rows(ki.as_ref(), Bound::NotNegative)?;
         let kd = self.rows(kd.as_ref(), Bound::NotNegative)?;
-        let _turn = self.turns.take(py)?;
-        for_either!(&self.own, lanes => {
-            for (row, one) in hold(py, lanes).iter_mut().enumerate() {
-                let present = *one.pid().gains();
-                one.set_gains(Gains {
-                    kp: kp.as_ref().map_or(present.kp, |given| given.row(row)),
-                    ki: ki.as_ref().map_or(present.ki, |given| given.row(row)),
-                    kd: kd.as_ref().map_or(present.kd, |given| given.row(row)),
-                });
-            }
-        });
-        Ok(())
+        for_each_arm!(self, py, (row, one) => {
+            let present = *one.pid().gains();
+            one.set_gains(Gains {
+                kp: kp.as_ref().map_or(present.kp, |given| given.row(row)),
+                ki: ki.as_ref().map_or(present.ki, |given| given.row(row)),
+                kd: kd.as_ref().map_or(present.kd, |given| given.row(row)),
+            });
+        })
     }
 
     /// Changes the given parameters: `gravity` [m/s²], a number or (`n_arms`,), `masses` [kg] and `lengths` [m].
@@ -267,19 +273,15 @@ impl Batch {
         let gravity = self.column(gravity.as_ref(), Bound::NotNegative)?;
         let masses = self.rows(masses.as_ref(), Bound::Positive)?;
         let lengths = self.rows(lengths.as_ref(), Bound::Positive)?;
-        let _turn = self.turns.take(py)?;
-        for_either!(&self.own, lanes => {
-            for (row, one) in hold(py, lanes).iter_mut().enumerate() {
-                let present = one.arm();
-                let arm = Arm::new(
-                    lengths.as_ref().map_or(*present.lengths(), |given| given.row(row)),
-                    masses.as_ref().map_or(*present.masses(), |given| given.row(row)),
-                    gravity.as_ref().map_or(present.gravity(), |given| given.number(row)),
-                );
-                one.set_arm(arm.map_err(refused)?);
-            }
-        });
-        Ok(())
+        for_each_arm!(self, py, (row, one) => {
+            let present = one.arm();
+            let arm = Arm::new(
+                lengths.as_ref().map_or(*present.lengths(), |given| given.row(row)),
+                masses.as_ref().map_or(*present.masses(), |given| given.row(row)),
+                gravity.as_ref().map_or(present.gravity(), |given| given.number(row)),
+            );
+            one.set_arm(arm.map_err(refused)?);
+        })
     }
 
     /// Changes the given values: `method`, a name or one per arm, and `timestep` [s], a number or (`n_arms`,).
@@ -295,17 +297,13 @@ impl Batch {
             .transpose()?;
         let timestep = read("timestep", timestep)?;
         let timestep = self.column(timestep.as_ref(), Bound::Positive)?;
-        let _turn = self.turns.take(py)?;
-        for_either!(&self.own, lanes => {
-            for (row, one) in hold(py, lanes).iter_mut().enumerate() {
-                let method = methods.as_deref().and_then(|methods| of_arm(methods, row));
-                one.set_method(method.unwrap_or(one.method()));
-                if let Some(timestep) = &timestep {
-                    one.set_timestep(timestep.number(row));
-                }
+        for_each_arm!(self, py, (row, one) => {
+            let method = methods.as_deref().and_then(|methods| of_arm(methods, row));
+            one.set_method(method.unwrap_or(one.method()));
+            if let Some(timestep) = &timestep {
+                one.set_timestep(timestep.number(row));
             }
-        });
-        Ok(())
+        })
     }
 
     /// Changes the given values: `control_period` [s], a number or (`n_arms`,), 0 for every step, and `control_delay`,
@@ -322,32 +320,22 @@ impl Batch {
             .transpose()?;
         let periods = read("control_period", control_period)?;
         let periods = self.column(periods.as_ref(), Bound::NotNegative)?;
-        let _turn = self.turns.take(py)?;
-        for_either!(&self.own, lanes => {
-            for (row, one) in hold(py, lanes).iter_mut().enumerate() {
-                let present = one.control_period();
-                let delay = delays.as_deref().and_then(|delays| of_arm(delays, row));
-                one.set_control_period(ControlPeriod {
-                    period: periods.as_ref().map_or(present.period, |periods| periods.number(row)),
-                    delay: delay.unwrap_or(present.delay),
-                });
-            }
-        });
-        Ok(())
+        for_each_arm!(self, py, (row, one) => {
+            let present = one.control_period();
+            let delay = delays.as_deref().and_then(|delays| of_arm(delays, row));
+            one.set_control_period(ControlPeriod {
+                period: periods.as_ref().map_or(present.period, |periods| periods.number(row)),
+                delay: delay.unwrap_or(present.delay),
+            });
+        })
     }
 
     /// Turns the controllers on or off. From off to on an integral starts at zero.
     #[pyo3(signature = (data=Flag::Is(true)), text_signature = "($self, data=True)")]
     fn enable(&self, py: Python<'_>, data: Flag) -> PyResult<()> {
         let data = data.read("data")?;
-        let _turn = self.turns.take(py)?;
-        for_either!(&self.own, lanes => {
-            let mut lanes = hold(py, lanes);
-            let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| {
-                lanes.iter_mut().for_each(|one| one.enable(data));
-                shown.show(lanes);
-            })
+        change_shown!(self, py, lanes => {
+            lanes.iter_mut().for_each(|one| one.enable(data));
         })
     }
 
