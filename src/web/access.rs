@@ -68,7 +68,8 @@ pub(crate) fn read_origin(text: &str) -> Result<Box<str>, String> {
     let usual = [("http://", ":80"), ("https://", ":443")].into_iter();
     let mut usual = usual.filter(|(scheme, _)| origin.starts_with(scheme));
     let bare = usual.find_map(|(_, port)| origin.strip_suffix(port));
-    needed(is_origin.then(|| bare.unwrap_or(&origin).into()), needs, text)
+    let origin = bare.unwrap_or(&origin);
+    needed(is_origin.then(|| origin.into()), needs, text)
 }
 
 /// Why a request is refused, and the connection closed.
