@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use crate::system::in_virtual_time;
-use crate::virtual_time::{Gateway, Peer, WIDE, turns_of_others};
+use crate::virtual_time::{Client, Gateway, WIDE, turns_of_others};
 use pendularm::actors::gateway::limits::STALL_LIMIT;
 use pendularm::actors::gateway::registry::FinishAll;
 use serde_json::{Value, json};
@@ -21,21 +21,23 @@ const EACH: usize = 100;
 /// end each client has one notice per frame.
 fn assert_ends_in_turns(
     frame: impl Fn(usize) -> Value,
-    end: impl AsyncFnOnce(Peer),
+    end: impl AsyncFnOnce(Client),
     is_end: impl Fn(&Value) -> bool,
 ) {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut provider = gateway.connect(WIDE);
-        provider.provide("/s").await;
-        provider
-            .send(json!({"op": "advertise_action", "action": "/a", "type": "t/A"}))
-            .await;
-        provider.receive().await;
-        let mut clients: Vec<Peer> = (0..CLIENTS).map(|_| gateway.connect(WIDE)).collect();
+        for advertise in [
+            json!({"op": "advertise_service", "service": "/s"}),
+            json!({"op": "advertise_action", "action": "/a", "type": "t/A"}),
+        ] {
+            provider.send(&advertise).await;
+            provider.receive().await;
+        }
+        let mut clients: Vec<Client> = (0..CLIENTS).map(|_| gateway.connect(WIDE)).collect();
         for client in &mut clients {
             for n in 0..EACH {
-                client.send(frame(n)).await;
+                client.send(&frame(n)).await;
             }
         }
         for _ in 0..CLIENTS * EACH {
@@ -78,7 +80,7 @@ fn calls_whose_provider_goes() {
 
 #[test]
 fn calls_whose_time_is_over() {
-    let at_once = async |_: Peer| tokio::time::advance(Duration::from_secs(61)).await;
+    let at_once = async |_: Client| tokio::time::advance(Duration::from_secs(61)).await;
     let late = |response: &Value| failed(response, "timeout");
     assert_ends_in_turns(call, at_once, late);
 }
@@ -103,7 +105,10 @@ fn a_caller_that_has_stopped_sending_is_kept_until_its_socket_is_closed() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut provider = gateway.connect(WIDE);
-        provider.provide("/s").await;
+        provider
+            .send(&json!({"op": "advertise_service", "service": "/s"}))
+            .await;
+        provider.receive().await;
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let socket = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
         let (accepted, peer) = listener.accept().unwrap();

@@ -65,7 +65,7 @@ use std::time::Duration;
 use self::held::KeptCalls;
 use self::patterns::{check, expand, number, range};
 use self::peer::{LONG_PATIENCE, Peer, SHORT_PATIENCE, ask};
-use crate::nodes::{start_whole, work_in_this_thread};
+use crate::stage::Stage;
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
 use pendularm::actors::gateway::connection::admission::Admission;
@@ -136,10 +136,9 @@ struct World {
 
 impl World {
     async fn start<const N: usize>() -> Self {
-        let gateway = Gateway::bare().await;
-        let (registry, gauges) = (&gateway.registry, &gateway.gauges);
-        work_in_this_thread(start_whole::<N>(registry, gauges, 1).await.1);
-        Self::at(gateway, N, KeptCalls::default())
+        let stage = Stage::<N>::start().await;
+        stage.compute();
+        Self::at(stage.gateway, N, KeptCalls::default())
     }
 
     /// A gateway with the two nodes that keep their calls.

@@ -12,9 +12,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::system::in_virtual_time;
-use crate::virtual_time::{Gateway, Node, WIDE, assert_elapsed, settle, turns_of_others};
+use crate::virtual_time::{Gateway, WIDE, assert_elapsed, route, settle, turns_of_others};
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::node::ServiceCall;
 use pendularm::protocol::catalog::Service;
 use pendularm_client::pipe::Client;
 use pendularm_client::websocket::{LAST, append, opcode};
