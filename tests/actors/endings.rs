@@ -1,5 +1,5 @@
-//! Thousands of calls and goals that end at one instant: other tasks still have turns. A caller that has gone, and one
-//! that reads nothing.
+//! Thousands of calls and goals that end at one instant: other tasks still have turns. A caller that reads nothing.
+//! `tests/wire/places.rs` has callers that have gone.
 //!
 //! **Invariant:** the share of other tasks is counted in their turns.
 
@@ -90,44 +90,6 @@ fn goals_of_a_disconnected_action_server() {
     let goal = |n| json!({"op": "send_action_goal", "action": "/a", "action_type": "t/A", "id": n, "args": {}});
     let aborted = |result: &Value| result["op"] == "action_result" && result["status"] == 6;
     assert_ends_in_turns(goal, async |provider| drop(provider), aborted);
-}
-
-/// The client's pipe stays open: only its socket shows that nobody waits for the answer.
-#[cfg(target_os = "linux")]
-#[test]
-fn a_caller_that_has_stopped_sending_is_kept_until_its_socket_is_closed() {
-    use std::net::{Shutdown, TcpListener, TcpStream};
-    use std::sync::Arc;
-
-    use pendularm::actors::gateway::connection::{Connection, Ends};
-    use tokio::io::duplex;
-
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let mut provider = gateway.connect(WIDE);
-        provider
-            .send(&json!({"op": "advertise_service", "service": "/s"}))
-            .await;
-        provider.receive().await;
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let socket = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
-        let (accepted, peer) = listener.accept().unwrap();
-        let local = accepted.local_addr().unwrap();
-        let (mut caller, theirs) = duplex(WIDE);
-        let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
-        let ends = Ends { local, peer };
-        Connection::start_with(None, Arc::default(), ends, theirs, registry, gauges);
-        let call = format!("{}\n", call(1));
-        caller.write_all(call.as_bytes()).await.unwrap();
-        caller.shutdown().await.unwrap();
-        socket.shutdown(Shutdown::Write).unwrap();
-        provider.receive().await;
-        sleep(Duration::from_secs(5)).await;
-        assert_eq!(gateway.gauges.connections(), 2, "it may still read");
-        drop(socket);
-        sleep(Duration::from_secs(1)).await;
-        assert_eq!(gateway.gauges.connections(), 1);
-    });
 }
 
 /// The answers would wait in memory.
