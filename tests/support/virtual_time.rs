@@ -21,12 +21,10 @@ use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::memory::Memory;
 use pendularm_client::pipe;
 use tokio::io::{AsyncRead, AsyncWrite, DuplexStream, ReadBuf, duplex};
-use tokio::time::{Instant, sleep};
+use tokio::time::sleep;
 
 /// Longest virtual time of a wait before a test fails.
 const PATIENCE: Duration = Duration::from_secs(600);
-/// The timers' grain.
-pub const GRAIN: Duration = Duration::from_millis(2);
 /// The pipe to a client that reads everything at once.
 pub const WIDE: usize = 1 << 26;
 
@@ -184,13 +182,4 @@ struct Routed<T>(T);
 pub fn route<T: Send + 'static>(mut take: impl FnMut(T) + 'static) -> Route<T> {
     let node = stand_in(move |Routed(one)| take(one));
     Box::new(move |one| node.do_send(Routed(one)))
-}
-
-/// Asserts that `since` is `expected` ago.
-pub fn assert_elapsed(since: Instant, expected: Duration) {
-    let elapsed = since.elapsed();
-    assert!(
-        elapsed >= expected && elapsed <= expected + 10 * GRAIN,
-        "{elapsed:?} instead of {expected:?}"
-    );
 }

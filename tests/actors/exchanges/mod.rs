@@ -193,7 +193,7 @@ impl World {
     async fn connect(&self, name: &str, room: usize) -> Peer {
         let ours = self.open(room);
         let stream = if name.starts_with('w') {
-            pipe::Client::web_on(ours, LONG_PATIENCE, "127.0.0.1:9095", "/").await
+            pipe::Client::web_on(ours, LONG_PATIENCE).await
         } else {
             pipe::Client::on(ours, LONG_PATIENCE)
         };

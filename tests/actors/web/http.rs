@@ -46,7 +46,8 @@ fn clients_that_take_no_byte_of_a_file_keep_others_from_files_for_a_time_only() 
         let mut late = gateway.open(Arc::clone(&admission), WIDE);
         late.write_all(request.as_bytes()).await.unwrap();
         assert_eq!(late.read_u8().await.unwrap(), b'H');
-        assert_elapsed(began, ANSWER_TIME);
+        let (elapsed, most) = (began.elapsed(), ANSWER_TIME + Duration::from_millis(20));
+        assert!((ANSWER_TIME..=most).contains(&elapsed), "{elapsed:?}");
         let mut text = vec![0; MAX_FILE as usize];
         late.read_exact(&mut text).await.unwrap();
         let head = String::from_utf8_lossy(&text[..1024]);
