@@ -215,15 +215,6 @@ impl Client {
         expect("a frame", self.next_frame(Instant::now() + self.patience))
     }
 
-    /// The next frame as text.
-    #[track_caller]
-    pub fn receive_text(&mut self) -> String {
-        match self.next_event(Instant::now() + self.patience) {
-            Ok(Event::Text(text)) => text,
-            other => panic!("{other:?} instead of a text"),
-        }
-    }
-
     /// The next frame for which `wanted` is true. The others are kept.
     #[track_caller]
     pub fn receive_where(&mut self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {

@@ -73,16 +73,3 @@ pub fn values(mut response: Value) -> Value {
     assert_eq!(response["status"], "", "{response}");
     response["values"].take()
 }
-
-/// The reason in a response that must be a refusal.
-///
-/// # Panics
-/// If the service has not refused, or has given no reason.
-#[must_use]
-#[track_caller]
-pub fn reason(response: &Value) -> String {
-    assert_eq!(response["result"], false, "{response}");
-    let reason = response["status"].as_str().unwrap_or_default();
-    assert!(!reason.is_empty(), "a refusal without a reason: {response}");
-    reason.to_owned()
-}

@@ -7,8 +7,8 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::time::timeout;
 
 use crate::codec::{Codec, Event, Framing};
-use crate::websocket::{LAST, append, append_close, handshake, opcode};
-use crate::{Error, call, is_response_to, reason, values};
+use crate::websocket::{LAST, append, handshake, opcode};
+use crate::{Error, call, is_response_to, values};
 
 /// The mask of control frames.
 const MASK: [u8; 4] = [1, 2, 3, 4];
@@ -33,13 +33,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         Self::with(Framing::Lines, stream, patience)
     }
 
-    /// The same by WebSocket, at `target` of `host`.
+    /// The same by WebSocket.
     ///
     /// # Panics
     /// As all methods below: if the expected event does not happen in time.
-    pub async fn web_on(stream: S, patience: Duration, host: &str, target: &str) -> Self {
+    pub async fn web_on(stream: S, patience: Duration) -> Self {
         let mut client = Self::with(Framing::WebSocket, stream, patience);
-        let request = handshake(host, target, "");
+        let request = handshake("127.0.0.1:9095", "/", "");
         client.send_bytes(request.as_bytes()).await;
         while !client.codec.is_open() {
             // The runtime sends nothing before a request of the client.
@@ -93,13 +93,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
     pub async fn send_text(&mut self, frame: &str) {
         let mut bytes = Vec::new();
         self.codec.write(frame, &mut bytes);
-        self.send_bytes(&bytes).await;
-    }
-
-    /// Sends a close frame.
-    pub async fn close(&mut self, code: u16, reason: &str) {
-        let mut bytes = Vec::new();
-        append_close(&mut bytes, MASK, code, reason);
         self.send_bytes(&bytes).await;
     }
 
@@ -177,18 +170,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         }
     }
 
-    /// All frames up to the end of the stream.
-    pub async fn rest(&mut self) -> Vec<Value> {
-        let mut frames = Vec::new();
-        loop {
-            match self.next_frame().await {
-                Ok(frame) => frames.push(frame),
-                Err(Error::Ended) if self.codec.is_between_messages() => return frames,
-                Err(error) => panic!("an orderly end is awaited: {error}"),
-            }
-        }
-    }
-
     /// Whether nothing arrives in this time, not even the end.
     pub async fn receives_nothing_for(&mut self, time: Duration) -> bool {
         if !self.codec.pending().is_empty() {
@@ -199,11 +180,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         };
         self.codec.push(&self.chunk[..read.unwrap_or(0)]);
         false
-    }
-
-    /// The next message on `topic`.
-    pub async fn message(&mut self, topic: &str) -> Value {
-        self.receive_where(|frame| frame["topic"] == topic).await["msg"].take()
     }
 
     /// Calls a service and returns the whole response.
@@ -217,11 +193,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
     /// Calls a service that must succeed and returns its values.
     pub async fn ask(&mut self, service: &str, args: Value) -> Value {
         values(self.call(service, args).await)
-    }
-
-    /// Calls a service that must refuse the call, and returns the reason.
-    pub async fn refusal(&mut self, service: &str, args: Value) -> String {
-        reason(&self.call(service, args).await)
     }
 
     /// Subscribes and waits for the confirmation.

@@ -12,8 +12,8 @@ use std::task::Poll;
 use std::time::Duration;
 
 use crate::arm_steps::{of_timestep, pause};
-use crate::stage::stand_in;
 use crate::system::in_virtual_time;
+use crate::virtual_time::stand_in;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
     ArmPose, ArmSettings, ArmSim, AttachNodes, CommandGoal, GoalOrder, GoalProgress, MAX_STEPS,

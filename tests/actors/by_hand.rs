@@ -1,7 +1,8 @@
 //! A paused arm that clients step: every answer is bit-identical to the offline stepper's.
 
-use crate::stage::{Client, Stage};
+use crate::stage::Stage;
 use crate::system::in_virtual_time;
+use crate::virtual_time::Client;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};

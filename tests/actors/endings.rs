@@ -1,12 +1,12 @@
-//! Thousands of calls and goals that end at one instant: other tasks still have turns. A caller that has gone, and one
-//! that reads nothing.
+//! Thousands of calls and goals that end at one instant: other tasks still have turns. A caller that reads nothing.
+//! `tests/wire/places.rs` has callers that have gone.
 //!
 //! **Invariant:** the share of other tasks is counted in their turns.
 
 use std::time::Duration;
 
 use crate::system::in_virtual_time;
-use crate::virtual_time::{Gateway, Peer, WIDE, turns_of_others};
+use crate::virtual_time::{Client, Gateway, WIDE, turns_of_others};
 use pendularm::actors::gateway::limits::STALL_LIMIT;
 use pendularm::actors::gateway::registry::FinishAll;
 use serde_json::{Value, json};
@@ -21,21 +21,23 @@ const EACH: usize = 100;
 /// end each client has one notice per frame.
 fn assert_ends_in_turns(
     frame: impl Fn(usize) -> Value,
-    end: impl AsyncFnOnce(Peer),
+    end: impl AsyncFnOnce(Client),
     is_end: impl Fn(&Value) -> bool,
 ) {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut provider = gateway.connect(WIDE);
-        provider.provide("/s").await;
-        provider
-            .send(json!({"op": "advertise_action", "action": "/a", "type": "t/A"}))
-            .await;
-        provider.receive().await;
-        let mut clients: Vec<Peer> = (0..CLIENTS).map(|_| gateway.connect(WIDE)).collect();
+        for advertise in [
+            json!({"op": "advertise_service", "service": "/s"}),
+            json!({"op": "advertise_action", "action": "/a", "type": "t/A"}),
+        ] {
+            provider.send(&advertise).await;
+            provider.receive().await;
+        }
+        let mut clients: Vec<Client> = (0..CLIENTS).map(|_| gateway.connect(WIDE)).collect();
         for client in &mut clients {
             for n in 0..EACH {
-                client.send(frame(n)).await;
+                client.send(&frame(n)).await;
             }
         }
         for _ in 0..CLIENTS * EACH {
@@ -78,7 +80,7 @@ fn calls_whose_provider_goes() {
 
 #[test]
 fn calls_whose_time_is_over() {
-    let at_once = async |_: Peer| tokio::time::advance(Duration::from_secs(61)).await;
+    let at_once = async |_: Client| tokio::time::advance(Duration::from_secs(61)).await;
     let late = |response: &Value| failed(response, "timeout");
     assert_ends_in_turns(call, at_once, late);
 }
@@ -88,41 +90,6 @@ fn goals_of_a_disconnected_action_server() {
     let goal = |n| json!({"op": "send_action_goal", "action": "/a", "action_type": "t/A", "id": n, "args": {}});
     let aborted = |result: &Value| result["op"] == "action_result" && result["status"] == 6;
     assert_ends_in_turns(goal, async |provider| drop(provider), aborted);
-}
-
-/// The client's pipe stays open: only its socket shows that nobody waits for the answer.
-#[cfg(target_os = "linux")]
-#[test]
-fn a_caller_that_has_stopped_sending_is_kept_until_its_socket_is_closed() {
-    use std::net::{Shutdown, TcpListener, TcpStream};
-    use std::sync::Arc;
-
-    use pendularm::actors::gateway::connection::{Connection, Ends};
-    use tokio::io::duplex;
-
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let mut provider = gateway.connect(WIDE);
-        provider.provide("/s").await;
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let socket = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
-        let (accepted, peer) = listener.accept().unwrap();
-        let local = accepted.local_addr().unwrap();
-        let (mut caller, theirs) = duplex(WIDE);
-        let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
-        let ends = Ends { local, peer };
-        Connection::start_with(None, Arc::default(), ends, theirs, registry, gauges);
-        let call = format!("{}\n", call(1));
-        caller.write_all(call.as_bytes()).await.unwrap();
-        caller.shutdown().await.unwrap();
-        socket.shutdown(Shutdown::Write).unwrap();
-        provider.receive().await;
-        sleep(Duration::from_secs(5)).await;
-        assert_eq!(gateway.gauges.connections(), 2, "it may still read");
-        drop(socket);
-        sleep(Duration::from_secs(1)).await;
-        assert_eq!(gateway.gauges.connections(), 1);
-    });
 }
 
 /// The answers would wait in memory.

@@ -1,7 +1,8 @@
 //! Goals between their node and the arm: messages that cross. `exchanges/goals.txt` has the clients' frames.
 
-use crate::stage::{Stage, accept, ms, pass, silent_tracker, stand_in};
+use crate::stage::{Stage, accept, ms, silent_tracker};
 use crate::system::in_virtual_time;
+use crate::virtual_time::stand_in;
 use actix::prelude::*;
 use pendularm::actors::arm::ik_action::{GoalRequest, GoalTracker, IkAction};
 use pendularm::actors::arm::sim::{CommandGoal, GoalOrder, GoalProgress, TrackGoal};
@@ -9,6 +10,7 @@ use pendularm::actors::node::{Publish, ask};
 use pendularm::math::goal::{Criteria, Outcome};
 use pendularm::math::kinematics::Target;
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
+use tokio::time::sleep;
 
 /// A goal far from the starting pose.
 pub fn elsewhere() -> GoalRequest<2> {
@@ -42,7 +44,7 @@ fn a_goal_is_announced_only_when_the_one_before_is_in_motion() {
         for goal in goals.collect::<Vec<_>>() {
             goal.await.unwrap().unwrap();
         }
-        pass(ms(1)).await;
+        sleep(ms(1)).await;
         for _ in 0..3 {
             assert_eq!(noted.recv().await, Some("announced"));
             assert_eq!(noted.recv().await, Some("published"));
@@ -115,7 +117,7 @@ fn a_goal_is_not_judged_before_its_setpoint_has_come() {
         let tracking = stage.arm.send(TrackGoal { goal, owner }).await;
         let tracking = tracking.unwrap().unwrap();
         assert_eq!(tracking.positions, [0.0, 0.0]);
-        pass(ms(100)).await;
+        sleep(ms(100)).await;
         assert!(news.try_recv().is_err());
         stage.arm.do_send(CommandGoal {
             number: 1,

@@ -6,15 +6,14 @@ use std::rc::Rc;
 use std::sync::atomic::Ordering;
 
 use crate::ik_action::elsewhere;
-use crate::stage::{
-    Client, asked, connect, ms, pass, pose_at, silent_arm, silent_tracker, stand_in,
-};
+use crate::stage::{asked, ms, pose_at, silent_arm, silent_tracker};
 use crate::system::{counting_wake_ups, in_virtual_time};
+use crate::virtual_time::{Client, Gateway, WIDE, stand_in};
 use actix::prelude::*;
 use pendularm::actors::arm::ik_action::{CancelRejected, CancelRequest, GoalReport, SendGoal};
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, TrialRequest};
 use pendularm::actors::arm::sim::{ArmPose, GoalProgress, Pose};
-use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
+use pendularm::actors::gateway::registry::{Attach, Nodes};
 use pendularm::actors::node::Barrier;
 use pendularm::actors::node::Call;
 use pendularm::actors::start::start_goal_nodes;
@@ -24,7 +23,7 @@ use pendularm::math::trial::Changes;
 use pendularm::protocol::op::fields::Rejections;
 use pendularm::services::goals::AcceptedGoal;
 use serde_json::Value;
-use tokio::time::Instant;
+use tokio::time::{Instant, sleep};
 
 const STATUS: &str = "/ik_trial/status";
 
@@ -94,8 +93,7 @@ fn reached_at(time: f64) -> GoalReport<2> {
 
 /// A trial with substitutes, and a client that subscribes to its status.
 async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Addr<IkTrial<2>>, Client, Instant) {
-    let gauges = std::sync::Arc::default();
-    let registry = Registry::new(std::sync::Arc::clone(&gauges)).start();
+    let gateway = Gateway::bare().await;
     let born = Instant::now();
     let (of_arm, of_goals, of_barrier) = (Rc::clone(script), Rc::clone(script), Rc::clone(script));
     let arm = stand_in(move |_: ArmPose<2>| Pose {
@@ -117,13 +115,13 @@ async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Addr<IkTrial<2>>, C
             }
         }),
     };
-    let publish = registry.clone().recipient();
+    let publish = gateway.registry.clone().recipient();
     let rng = fastrand::Rng::with_seed(1);
     let trial = IkTrial::<2>::new(arm, goals, publish, rng).start();
     let mut nodes = Nodes::default();
     IkTrial::attach(&trial, &mut nodes);
-    registry.send(Attach(nodes)).await.unwrap();
-    let mut client = connect(&registry, &gauges);
+    gateway.registry.send(Attach(nodes)).await.unwrap();
+    let mut client = gateway.connect(WIDE).remembering();
     client.subscribe(STATUS).await;
     (trial, client, born)
 }
@@ -179,16 +177,16 @@ fn after_a_refusal_another_target_is_sampled_for_the_lengths_of_that_moment() {
 #[test]
 fn no_timer_runs_without_a_goal_a_trial_or_a_subscriber() {
     counting_wake_ups(|sleeps| async move {
-        let gauges = std::sync::Arc::default();
-        let registry = Registry::new(std::sync::Arc::clone(&gauges)).start();
+        let gateway = Gateway::bare().await;
+        let registry = &gateway.registry;
         let mut nodes = Nodes::default();
         let (arm, tracker) = (silent_arm(), silent_tracker());
-        let (action, trial) = start_goal_nodes::<2>(arm, tracker, &registry, 1, &mut nodes);
+        let (action, trial) = start_goal_nodes::<2>(arm, tracker, registry, 1, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
-        let mut client = connect(&registry, &gauges);
+        let mut client = gateway.connect(WIDE).remembering();
         let an_hour = || async {
             let before = sleeps.load(Ordering::Relaxed);
-            pass(ms(3_600_000)).await;
+            sleep(ms(3_600_000)).await;
             sleeps.load(Ordering::Relaxed) - before
         };
         let quiet = 0..100;
@@ -206,7 +204,7 @@ fn no_timer_runs_without_a_goal_a_trial_or_a_subscriber() {
         let (awake, received) = tokio::join!(an_hour(), listening);
         assert!(awake >= 36_000 && received >= 35_999, "{awake}, {received}");
         drop(client);
-        pass(ms(1000)).await;
+        sleep(ms(1000)).await;
         assert!(quiet.contains(&an_hour().await), "the watcher is gone");
     });
 }

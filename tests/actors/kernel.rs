@@ -5,14 +5,14 @@
 use std::cell::Cell;
 use std::time::Duration;
 
-use crate::nodes::work_in_this_thread;
-use crate::stage::{Client, Stage, ms, pass};
+use crate::stage::{Stage, ms};
 use crate::system::in_virtual_time;
+use crate::virtual_time::Client;
 use pendularm::actors::resources::work_clock;
 use pendularm::math::arm::Arm;
 use pendularm_wasm::Kernel;
 use serde_json::{Value, json};
-use tokio::time::Instant;
+use tokio::time::{Instant, sleep};
 
 thread_local! {
     static BEGAN: Cell<Option<Instant>> = const { Cell::new(None) };
@@ -43,7 +43,7 @@ where
         // queries of the clock.
         work_clock::count(Duration::from_micros(1));
         let stage = Stage::<N>::with_seed(SEED).await;
-        work_in_this_thread(stage.pool.clone());
+        stage.compute();
         BEGAN.set(Some(Instant::now()));
         let kernel = Kernel::new(clock, SEED);
         let client = stage.connect();
@@ -86,11 +86,11 @@ where
             if clock() + wait > end {
                 break;
             }
-            pass(wait).await;
+            sleep(wait).await;
             self.kernel.tick();
             self.hear();
         }
-        pass(end.saturating_sub(clock())).await;
+        sleep(end.saturating_sub(clock())).await;
     }
 
     /// The answers of both, and the statuses before them.

@@ -22,8 +22,6 @@ mod kernel;
 mod listener;
 mod log_repeats;
 mod memory;
-#[path = "../support/nodes.rs"]
-mod nodes;
 mod pacing;
 #[cfg(feature = "record")]
 mod recorder;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::study::settled_arm;
 use crate::system::{in_real_time, in_virtual_time};
-use crate::virtual_time::{Gateway, Peer, WIDE, settle};
+use crate::virtual_time::{Client, Gateway, WIDE, settle};
 use actix::prelude::*;
 use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
@@ -34,9 +34,9 @@ async fn computing(answers: usize, workers: &WorkerPool) -> Gateway {
     Gateway::within(Memory::of(1, answers), nodes).await
 }
 
-async fn ask(client: &mut Peer, service: &str, args: Value) {
+async fn ask(client: &mut Client, service: &str, args: Value) {
     client
-        .send(json!({"op": "call_service", "service": service, "args": args}))
+        .send(&json!({"op": "call_service", "service": service, "args": args}))
         .await;
 }
 
@@ -75,7 +75,7 @@ fn computations_that_fit_only_after_one_another_wait_for_one_another() {
         let gateway = computing(MIB, &workers).await;
         // The first answer fits into no pipe, so it keeps its memory, more than 32 parts of it, until it is read.
         let pipes = [SHORT].into_iter().chain([WIDE; 11]);
-        let mut clients: Vec<Peer> = pipes.map(|size| gateway.connect(size)).collect();
+        let mut clients: Vec<Client> = pipes.map(|size| gateway.connect(size)).collect();
         ask(&mut clients[0], STEP, steps(10_000)).await;
         while gateway.gauges.memory().taken() < 32 {
             sleep(Duration::from_millis(1)).await;

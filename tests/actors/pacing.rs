@@ -11,9 +11,10 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use crate::system::in_real_time;
-use crate::virtual_time::{Gateway, Node, WIDE, settle};
+use crate::virtual_time::{Gateway, WIDE, route, settle};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::node::ServiceCall;
 use pendularm::protocol::catalog::Service;
 use serde_json::json;
 
@@ -60,15 +61,12 @@ fn a_publisher_continues_when_all_its_subscribers_have_been_written_to() {
             let arrived = Rc::new(Cell::new(usize::MAX));
             let (seen, all) = (Rc::clone(&arrived), Rc::clone(&subscribers));
             let mut nodes = Nodes::default();
-            let node = Node {
-                on_call: Box::new(move |mut call| {
-                    let all = all.borrow();
-                    seen.set(all.iter().filter(|one| one.peek(&mut [0]).is_ok()).count());
-                    call.caller.succeed(&json!({}));
-                }),
-                ..Node::default()
+            let look = move |mut call: ServiceCall| {
+                let all = all.borrow();
+                seen.set(all.iter().filter(|one| one.peek(&mut [0]).is_ok()).count());
+                call.caller.succeed(&json!({}));
             };
-            node.attach(&mut nodes, &[Service::Pause], &[]);
+            nodes.services.insert(Service::Pause, route(look));
             let gateway = Gateway::with(nodes).await;
             let listener = TcpListener::bind("127.0.0.1:0").unwrap();
             for _ in 0..SUBSCRIBERS {
@@ -76,10 +74,11 @@ fn a_publisher_continues_when_all_its_subscribers_have_been_written_to() {
                 subscribers.borrow_mut().push(one);
             }
             let mut publisher = gateway.connect(WIDE);
-            publisher.advertise("/t").await;
+            let advertise = json!({"op": "advertise", "topic": "/t"});
+            publisher.send(&advertise).await;
             settle().await;
             let call = r#"{"op":"call_service","service":"/arm_sim/pause","id":1}"#;
-            publisher.send_text(&format!("{publish}{call}\n")).await;
+            publisher.send_text(&format!("{publish}{call}")).await;
             assert_eq!(publisher.receive().await["id"], 1);
             assert_eq!(arrived.get(), SUBSCRIBERS);
         });

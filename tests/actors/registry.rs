@@ -11,9 +11,9 @@ use std::time::Duration;
 
 use crate::stage::Stage;
 use crate::system::in_virtual_time;
-use crate::virtual_time::{Gateway, Node, WIDE, settle};
+use crate::virtual_time::{Gateway, WIDE, route, settle, stand_in};
 use pendularm::actors::gateway::registry::Nodes;
-use pendularm::actors::node::{Publish, TopicMessage};
+use pendularm::actors::node::{Interest, Publish, TopicMessage};
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages;
 use serde_json::json;
@@ -26,14 +26,13 @@ fn a_node_is_notified_of_the_first_subscriber_and_of_the_end_of_the_last() {
     in_virtual_time(async {
         let received: Log<(Topic, bool)> = Rc::default();
         let log = Rc::clone(&received);
-        let node = Node {
-            on_interest: Box::new(move |interest| {
-                log.borrow_mut().push((interest.topic, interest.wanted));
-            }),
-            ..Node::default()
-        };
+        let node = stand_in(move |Interest { topic, wanted }| {
+            log.borrow_mut().push((topic, wanted));
+        });
         let mut nodes = Nodes::default();
-        node.attach(&mut nodes, &[], &[Topic::JointStates, Topic::Clock]);
+        for topic in [Topic::JointStates, Topic::Clock] {
+            nodes.publishers.insert(topic, node.clone());
+        }
         let gateway = Gateway::with(nodes).await;
         let (mut first, mut second) = (gateway.connect(WIDE), gateway.connect(WIDE));
         first.subscribe("/joint_states").await;
@@ -41,12 +40,10 @@ fn a_node_is_notified_of_the_first_subscriber_and_of_the_end_of_the_last() {
         second.subscribe("/joint_states").await;
         second.subscribe("/clock").await;
         second.subscribe("/somebody_elses").await;
-        first
-            .send(json!({"op": "unsubscribe", "topic": "/joint_states"}))
-            .await;
-        first
-            .send(json!({"op": "unsubscribe", "topic": "/joint_states"}))
-            .await;
+        for _ in 0..2 {
+            let unsubscribe = json!({"op": "unsubscribe", "topic": "/joint_states"});
+            first.send(&unsubscribe).await;
+        }
         settle().await;
         let wanted = [(Topic::JointStates, true), (Topic::Clock, true)];
         assert_eq!(*received.borrow(), wanted);
@@ -82,12 +79,9 @@ fn a_nodes_message_on_a_topic_of_the_runtime_reaches_clients_but_not_the_listene
 async fn listening() -> (Gateway, Log<TopicMessage>) {
     let kept: Log<TopicMessage> = Rc::default();
     let log = Rc::clone(&kept);
-    let node = Node {
-        on_message: Box::new(move |message| log.borrow_mut().push(message)),
-        ..Node::default()
-    };
+    let keep = route(move |message| log.borrow_mut().push(message));
     let mut nodes = Nodes::default();
-    node.attach(&mut nodes, &[], &[Topic::JointTrajectory]);
+    nodes.subscribers.insert(Topic::JointTrajectory, keep);
     (Gateway::with(nodes).await, kept)
 }
 
@@ -97,12 +91,16 @@ fn a_trajectory_has_taken_effect_before_its_senders_next_frame_is_taken() {
     in_virtual_time(async {
         let (gateway, held) = listening().await;
         let (mut client, mut other) = (gateway.connect(WIDE), gateway.connect(WIDE));
-        client.publish("/joint_trajectory", 1).await;
-        client.publish("/joint_trajectory", 2).await;
-        client.call("/none", 1).await;
+        let call = |id| json!({"op": "call_service", "service": "/none", "id": id});
+        for n in 1..=2 {
+            let msg = json!({"n": n});
+            let publish = json!({"op": "publish", "topic": "/joint_trajectory", "msg": msg});
+            client.send(&publish).await;
+        }
+        client.send(&call(1)).await;
         assert!(client.receives_nothing_for(Duration::from_secs(60)).await);
         assert_eq!(held.borrow().len(), 1);
-        other.call("/none", 2).await;
+        other.send(&call(2)).await;
         assert_eq!(other.receive().await["id"], 2, "nobody else waits");
         held.borrow_mut().clear();
         settle().await;
@@ -124,7 +122,7 @@ fn a_message_of_a_node_is_made_only_if_its_topic_has_a_subscriber() {
             let message = Publish::made(Topic::IkResult, move || {
                 count.fetch_add(1, Ordering::Relaxed)
             });
-            stage.registry.send(message).await.unwrap();
+            stage.gateway.registry.send(message).await.unwrap();
             assert_eq!(made.load(Ordering::Relaxed), expected);
             client.subscribe(Topic::IkResult.name()).await;
         }

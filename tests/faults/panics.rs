@@ -8,14 +8,14 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 use crate::system::in_virtual_time;
-use crate::virtual_time::{Gateway, Node, WIDE, Watched, settle};
+use crate::virtual_time::{Gateway, WIDE, Watched, route, settle};
 use bytes::Bytes;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::node::Publish;
 use pendularm::actors::panics::{self, contain};
 use pendularm::protocol::catalog::{Service, Topic};
-use serde_json::json;
+use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::time::timeout;
 
@@ -30,6 +30,11 @@ fn ends() -> Vec<String> {
         Mutex::default()
     });
     ends.lock().unwrap().clone()
+}
+
+/// A call with the id 1.
+fn call(service: &str) -> Value {
+    pendularm_client::call(service, &json!({}), &json!(1))
 }
 
 fn has_ended_by(words: &str) -> bool {
@@ -63,7 +68,7 @@ fn a_panic_in_a_reader_or_writer_ends_that_client_alone() {
             assert!(closed.is_ok(), "the stream ends");
             settle().await;
             assert_eq!(gateway.gauges.connections(), 1);
-            other.call("/s", 1).await;
+            other.send(&call("/s")).await;
             let response = other.receive().await;
             assert!(
                 response["status"].as_str().unwrap().contains("no provider"),
@@ -114,9 +119,11 @@ fn a_panic_in_the_actor_of_a_client_ends_that_client_alone() {
             let connections = if n < 2 { 2 } else { 1 };
             assert_eq!(gateway.gauges.connections(), connections, "after {n}");
         }
-        let closed = timeout(Duration::from_secs(60), deaf.drain()).await;
+        let mut rest = Vec::new();
+        let reading = deaf.stream().read_to_end(&mut rest);
+        let closed = timeout(Duration::from_secs(60), reading).await;
         assert!(closed.is_ok(), "the stream ends");
-        other.call("/none", 1).await;
+        other.send(&call("/none")).await;
         assert_eq!(other.receive().await["id"], 1);
     });
     assert!(!has_ended_by("in the actor"));
@@ -127,14 +134,11 @@ fn a_panic_in_a_node_ends_the_process_with_one_line_that_says_where() {
     ends();
     in_virtual_time(async {
         let mut nodes = Nodes::default();
-        let node = Node {
-            on_call: Box::new(|_| panic!("in a node\nforged line")),
-            ..Node::default()
-        };
-        node.attach(&mut nodes, &[Service::Pause], &[]);
+        let trap = route(|_| panic!("in a node\nforged line"));
+        nodes.services.insert(Service::Pause, trap);
         let gateway = Gateway::with(nodes).await;
         let mut client = gateway.connect(WIDE);
-        client.call("/arm_sim/pause", 1).await;
+        client.send(&call("/arm_sim/pause")).await;
         settle().await;
     });
     let ends = ends();

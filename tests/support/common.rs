@@ -34,6 +34,11 @@ pub fn program() -> Command {
     without_variables(Command::new(env!("CARGO_BIN_EXE_pendularm")))
 }
 
+/// The program with these arguments, to its end.
+pub fn run(arguments: &[&str]) -> Output {
+    program().args(arguments).output().unwrap()
+}
+
 pub fn without_variables(mut command: Command) -> Command {
     for variable in VARIABLES {
         command.env_remove(variable);

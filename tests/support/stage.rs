@@ -4,45 +4,37 @@
 //! A test calls a node as another node does ([`asked`]), and receives the messages of a subscriber. A virtual second
 //! takes almost no real time, and always passes in the same way. So steps, messages and their order can be counted.
 
-use std::sync::Arc;
 use std::time::Duration;
 
-use crate::nodes::start_whole;
+use crate::virtual_time::{Client, Gateway, WIDE, stand_in};
 use actix::prelude::*;
 use pendularm::actors::arm::ik_action::GoalTracker;
 use pendularm::actors::arm::sim::{
     ArmPose, ArmSim, Pose, Reset, SetParams, SetSetpoint, TakeSnapshot, TrackGoal, Tracking,
 };
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::registry::Registry;
-use pendularm::actors::node::{Ask, Call, Publish, Reply, guard};
-use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::gateway::registry::Attach;
+use pendularm::actors::node::{Ask, Call, Nodes, Publish, Reply, guard};
+use pendularm::actors::start::start_arm;
 use pendularm::math::arm::State;
 use pendularm::math::kinematics::Unreachable;
 use pendularm::math::pid::Setpoint;
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::Topic;
-use pendularm_client::pipe;
-use tokio::io::DuplexStream;
 use tokio::sync::mpsc::UnboundedSender;
 use tokio::sync::oneshot;
 use tokio::time::sleep;
-
-/// Longest virtual time of an operation before a test fails.
-pub const PATIENCE: Duration = Duration::from_secs(600);
 
 pub const fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
 }
 
-/// All nodes, connected as in the runtime.
+/// All nodes, connected as in the runtime. The recorder is missing, because it needs a disk.
 pub struct Stage<const N: usize> {
-    pub registry: Addr<Registry>,
+    pub gateway: Gateway,
     pub arm: Addr<ArmSim<N>>,
     /// Computations, which run only while a test gives them turns.
     pub pool: WorkerPool,
-    pub gauges: Arc<Gauges>,
 }
 
 impl<const N: usize> Stage<N> {
@@ -51,19 +43,28 @@ impl<const N: usize> Stage<N> {
     }
 
     pub async fn with_seed(seed: u64) -> Self {
-        let gauges = Arc::new(Gauges::default());
-        let registry = Registry::new(Arc::clone(&gauges)).start();
-        let (arm, pool) = start_whole(&registry, &gauges, seed).await;
-        Self {
-            registry,
-            arm,
-            pool,
-            gauges,
-        }
+        let gateway = Gateway::bare().await;
+        let (registry, gauges) = (&gateway.registry, &gateway.gauges);
+        let (mut nodes, pool) = (Nodes::default(), WorkerPool::without_threads());
+        let arm = start_arm(registry, gauges, &pool, seed, &mut nodes);
+        registry.send(Attach(nodes)).await.unwrap();
+        Self { gateway, arm, pool }
     }
 
+    /// Does the computations in this thread, every millisecond.
+    pub fn compute(&self) {
+        let pool = self.pool.clone();
+        actix_rt::spawn(async move {
+            loop {
+                while pool.turn() {}
+                sleep(ms(1)).await;
+            }
+        });
+    }
+
+    /// A client that stores every frame that it receives.
     pub fn connect(&self) -> Client {
-        connect(&self.registry, &self.gauges)
+        self.gateway.connect(WIDE).remembering()
     }
 
     /// The present state of the arm's whole simulation.
@@ -117,44 +118,6 @@ where
         "nobody sends the end of a call: it is dropped"
     );
     answer
-}
-
-/// A client in the registry's own thread, through an in-memory pipe.
-pub fn connect(registry: &Addr<Registry>, gauges: &Arc<Gauges>) -> Client {
-    let (ours, theirs) = tokio::io::duplex(1 << 20);
-    Connection::start_on(theirs, registry.clone(), Arc::clone(gauges));
-    Client::on(ours, PATIENCE).remembering()
-}
-
-/// A client, over a pipe, that remembers every frame it has received.
-pub type Client = pipe::Client<DuplexStream>;
-
-/// Lets virtual time pass.
-pub async fn pass(time: Duration) {
-    sleep(time).await;
-}
-
-/// A substitute for a node: it answers each message by a closure.
-struct StandIn<M: Message>(Box<dyn FnMut(M) -> M::Result>);
-
-impl<M: Message + 'static> Actor for StandIn<M> {
-    type Context = Context<Self>;
-}
-
-impl<M: Message<Result: 'static> + 'static> Handler<M> for StandIn<M> {
-    type Result = MessageResult<M>;
-
-    fn handle(&mut self, message: M, _: &mut Context<Self>) -> Self::Result {
-        MessageResult((self.0)(message))
-    }
-}
-
-/// A node that answers messages of one type by this closure.
-pub fn stand_in<M>(answer: impl FnMut(M) -> M::Result + 'static) -> Recipient<M>
-where
-    M: Message<Result: Send + 'static> + Send + 'static,
-{
-    StandIn(Box::new(answer)).start().recipient()
 }
 
 /// A pose at q = 0, with links of 1 m.

@@ -3,10 +3,9 @@
 //!
 //! The clock moves only when everything waits for it, so a time that a test reads is exact to the timers' millisecond.
 
-use std::cell::{Cell, RefCell};
+use std::cell::Cell;
 use std::io::{self, IoSlice};
 use std::net::SocketAddr;
-use std::ops::{Deref, DerefMut};
 use std::pin::Pin;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -17,19 +16,15 @@ use actix::prelude::*;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::{Attach, Registry};
-use pendularm::actors::node::{Caller, Interest, Nodes, ServiceCall, TopicMessage};
+use pendularm::actors::node::{Nodes, Route};
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::memory::Memory;
-use pendularm::protocol::catalog::{Service, Topic};
-use pendularm_client::pipe::Client;
-use serde_json::{Value, json};
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, DuplexStream, ReadBuf, duplex};
-use tokio::time::{Instant, sleep};
+use pendularm_client::pipe;
+use tokio::io::{AsyncRead, AsyncWrite, DuplexStream, ReadBuf, duplex};
+use tokio::time::sleep;
 
-/// Longer than any wait of a test.
-const LONG: Duration = Duration::from_secs(7 * 24 * 3600);
-/// The timers' grain.
-pub const GRAIN: Duration = Duration::from_millis(2);
+/// Longest virtual time of a wait before a test fails.
+const PATIENCE: Duration = Duration::from_secs(600);
 /// The pipe to a client that reads everything at once.
 pub const WIDE: usize = 1 << 26;
 
@@ -67,68 +62,13 @@ impl Gateway {
     }
 
     /// A client whose pipe holds `room` bytes each way.
-    pub fn connect(&self, room: usize) -> Peer {
-        Peer(Client::on(self.open(Arc::default(), room), LONG))
+    pub fn connect(&self, room: usize) -> Client {
+        Client::on(self.open(Arc::default(), room), PATIENCE)
     }
 }
 
 /// A client on an in-memory pipe.
-pub struct Peer(Client<DuplexStream>);
-
-impl Deref for Peer {
-    type Target = Client<DuplexStream>;
-
-    fn deref(&self) -> &Self::Target {
-        &self.0
-    }
-}
-
-impl DerefMut for Peer {
-    fn deref_mut(&mut self) -> &mut Self::Target {
-        &mut self.0
-    }
-}
-
-impl Peer {
-    pub async fn send(&mut self, frame: Value) {
-        self.0.send(&frame).await;
-    }
-
-    pub async fn send_text(&mut self, text: &str) {
-        self.send_bytes(text.as_bytes()).await;
-    }
-
-    /// Reads all frames up to the end of the stream.
-    pub async fn drain(&mut self) {
-        let mut bytes = Vec::new();
-        let _ = self.stream().read_to_end(&mut bytes).await;
-    }
-
-    pub async fn subscribe(&mut self, topic: &str) {
-        self.send(json!({"op": "subscribe", "topic": topic})).await;
-        assert_eq!(self.receive().await["level"], "info");
-    }
-
-    pub async fn advertise(&mut self, topic: &str) {
-        self.send(json!({"op": "advertise", "topic": topic})).await;
-    }
-
-    pub async fn provide(&mut self, service: &str) {
-        self.send(json!({"op": "advertise_service", "service": service}))
-            .await;
-        assert_eq!(self.receive().await["level"], "info");
-    }
-
-    pub async fn publish(&mut self, topic: &str, n: u64) {
-        self.send(json!({"op": "publish", "topic": topic, "msg": {"n": n}}))
-            .await;
-    }
-
-    pub async fn call(&mut self, service: &str, id: u64) {
-        self.send(json!({"op": "call_service", "service": service, "id": id}))
-            .await;
-    }
-}
+pub type Client = pipe::Client<DuplexStream>;
 
 /// Runs all work that needs no virtual time, or almost none.
 pub async fn settle() {
@@ -210,118 +150,36 @@ impl AsyncWrite for Watched {
     }
 }
 
-/// A node that keeps received calls unanswered.
-#[derive(Clone, Default)]
-pub struct Held(pub Rc<RefCell<Vec<ServiceCall>>>);
+/// A substitute for a node: it answers each message by a closure.
+struct StandIn<M: Message>(Box<dyn FnMut(M) -> M::Result>);
 
-impl Held {
-    pub fn count(&self) -> usize {
-        self.0.borrow().len()
-    }
-
-    /// The oldest call that is held.
-    pub fn take(&self) -> Caller {
-        self.0.borrow_mut().remove(0).caller
-    }
-
-    /// Answers the oldest call.
-    pub fn answer(&self) {
-        self.take().succeed(&json!({}));
-    }
-}
-
-/// A node that passes its messages to closures.
-pub struct Node {
-    pub on_call: Box<dyn FnMut(ServiceCall)>,
-    pub on_message: Box<dyn FnMut(TopicMessage)>,
-    pub on_interest: Box<dyn FnMut(Interest)>,
-}
-
-impl Default for Node {
-    fn default() -> Self {
-        Self {
-            on_call: Box::new(drop),
-            on_message: Box::new(drop),
-            on_interest: Box::new(drop),
-        }
-    }
-}
-
-impl Node {
-    /// A node that keeps its calls.
-    pub fn holding(held: &Held) -> Self {
-        let held = held.clone();
-        Self {
-            on_call: Box::new(move |call| held.0.borrow_mut().push(call)),
-            ..Self::default()
-        }
-    }
-
-    /// A node that answers its calls at once, with nothing.
-    pub fn answering() -> Self {
-        Self {
-            on_call: Box::new(|mut call| call.caller.succeed(&json!({}))),
-            ..Self::default()
-        }
-    }
-
-    /// Starts it as the provider of `services`, and as subscriber and publisher of `topics`.
-    pub fn attach(self, nodes: &mut Nodes, services: &[Service], topics: &[Topic]) {
-        let address = self.start();
-        for service in services {
-            let node = address.clone();
-            let route = Box::new(move |call| node.do_send(Called(call)));
-            nodes.services.insert(*service, route);
-        }
-        for topic in topics {
-            let node = address.clone();
-            let route = Box::new(move |message| node.do_send(Sent(message)));
-            nodes.subscribers.insert(*topic, route);
-            nodes.publishers.insert(*topic, address.clone().recipient());
-        }
-    }
-}
-
-impl Actor for Node {
+impl<M: Message + 'static> Actor for StandIn<M> {
     type Context = Context<Self>;
 }
 
-/// A call, unread.
+impl<M: Message<Result: 'static> + 'static> Handler<M> for StandIn<M> {
+    type Result = MessageResult<M>;
+
+    fn handle(&mut self, message: M, _: &mut Context<Self>) -> Self::Result {
+        MessageResult((self.0)(message))
+    }
+}
+
+/// A node that answers messages of one type by this closure.
+pub fn stand_in<M>(answer: impl FnMut(M) -> M::Result + 'static) -> Recipient<M>
+where
+    M: Message<Result: Send + 'static> + Send + 'static,
+{
+    StandIn(Box::new(answer)).start().recipient()
+}
+
+/// What a route passes to its node, unread.
 #[derive(Message)]
 #[rtype(result = "()")]
-struct Called(ServiceCall);
+struct Routed<T>(T);
 
-impl Handler<Called> for Node {
-    type Result = ();
-    fn handle(&mut self, Called(call): Called, _: &mut Context<Self>) {
-        (self.on_call)(call);
-    }
-}
-
-/// A message on a topic, unread.
-#[derive(Message)]
-#[rtype(result = "()")]
-struct Sent(TopicMessage);
-
-impl Handler<Sent> for Node {
-    type Result = ();
-    fn handle(&mut self, Sent(message): Sent, _: &mut Context<Self>) {
-        (self.on_message)(message);
-    }
-}
-
-impl Handler<Interest> for Node {
-    type Result = ();
-    fn handle(&mut self, interest: Interest, _: &mut Context<Self>) {
-        (self.on_interest)(interest);
-    }
-}
-
-/// Asserts that `since` is `expected` ago.
-pub fn assert_elapsed(since: Instant, expected: Duration) {
-    let elapsed = since.elapsed();
-    assert!(
-        elapsed >= expected && elapsed <= expected + 10 * GRAIN,
-        "{elapsed:?} instead of {expected:?}"
-    );
+/// A route to a node that is a closure.
+pub fn route<T: Send + 'static>(mut take: impl FnMut(T) + 'static) -> Route<T> {
+    let node = stand_in(move |Routed(one)| take(one));
+    Box::new(move |one| node.do_send(Routed(one)))
 }

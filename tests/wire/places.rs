@@ -1,7 +1,7 @@
 //! Places of real sockets: the warning of the log, and places of clients that have closed. `tests/actors/exchanges/places.txt` has the
 //! others.
 
-use std::net::SocketAddr;
+use std::net::{Shutdown, SocketAddr};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
@@ -50,6 +50,9 @@ fn a_client_that_has_closed_its_socket_gets_no_answer() {
     let mut caller = Client::to(runtime.address);
     caller.send(&json!({"op": "call_service", "service": "/silent", "timeout": 60}));
     caller.settle();
+    caller.stream().shutdown(Shutdown::Write).unwrap();
+    // Its socket is checked several times: it may still read.
+    std::thread::sleep(Duration::from_secs(1));
     assert!(refused(runtime.address).contains("serves 3 clients"));
     drop(caller);
     let began = Instant::now();

@@ -2,7 +2,6 @@
 
 use std::fs::{self, File};
 use std::path::Path;
-use std::process::Command;
 use std::time::{Instant, SystemTime};
 
 use pendularm::record::{
@@ -11,7 +10,7 @@ use pendularm::record::{
 };
 use serde_json::{Value, json};
 
-use crate::common::{PATIENCE, Runtime, signal};
+use crate::common::{self, PATIENCE, Runtime, signal};
 use crate::folder::Folder;
 
 pub(super) fn passages(file: &Path) -> (Vec<RecordedMessage>, RecordEnding) {
@@ -34,8 +33,7 @@ fn holds_call(file: &Path, args: &str) -> bool {
 
 /// The program with a command: its exit status and its output.
 fn run(arguments: &[&str]) -> (Option<i32>, String) {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_pendularm"));
-    let output = program.args(arguments).output().unwrap();
+    let output = common::run(arguments);
     let said = [output.stdout, output.stderr].concat();
     (output.status.code(), String::from_utf8(said).unwrap())
 }

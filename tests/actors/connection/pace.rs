@@ -40,13 +40,14 @@ async fn lateness(queue_length: u64, a_second: u32, chunk: usize) -> (Duration, 
     settle().await;
     let began = Instant::now();
     let mut publisher = gateway.connect(WIDE);
-    publisher.advertise("/t").await;
+    let advertise = json!({"op": "advertise", "topic": "/t"});
+    publisher.send(&advertise).await;
     let publishing = actix::spawn(async move {
         for n in 1..30 * 60 {
             sleep_until(began + Duration::from_secs(1) * n / 60).await;
             let msg = json!({"at": began.elapsed().as_secs_f64(), "fill": "x".repeat(400)});
             publisher
-                .send(json!({"op": "publish", "topic": "/t", "msg": msg}))
+                .send(&json!({"op": "publish", "topic": "/t", "msg": msg}))
                 .await;
         }
     });

@@ -1,15 +1,20 @@
 //! Two nodes that keep their calls until an exchange decides about them, and the counts of a gateway.
 
+use std::cell::RefCell;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use pendularm::actors::gateway::registry::Nodes;
-use pendularm::actors::node::Caller;
+use pendularm::actors::node::{Caller, ServiceCall};
 use pendularm::actors::resources::memory::Memory;
 use pendularm::protocol::catalog::Service;
 use serde_json::Value;
 
 use super::patterns::{expand, range};
-use crate::virtual_time::{Gateway, Held, Node, settle};
+use crate::virtual_time::{Gateway, route, settle};
+
+/// Calls that a node has received and not answered, the oldest first.
+type Held = Rc<RefCell<Vec<ServiceCall>>>;
 
 /// The calls of `/arm_sim/integration_step` and of `/arm_sim/set_params`.
 #[derive(Default)]
@@ -24,8 +29,14 @@ impl KeptCalls {
     /// A gateway with these nodes, whose clients share this memory.
     pub(super) async fn gateway(&self, memory: Memory) -> Gateway {
         let mut nodes = Nodes::default();
-        Node::holding(&self.steps).attach(&mut nodes, &[Service::IntegrationStep], &[]);
-        Node::holding(&self.params).attach(&mut nodes, &[Service::SetParams], &[]);
+        for (held, service) in [
+            (&self.steps, Service::IntegrationStep),
+            (&self.params, Service::SetParams),
+        ] {
+            let held = Rc::clone(held);
+            let hold = route(move |call| held.borrow_mut().push(call));
+            nodes.services.insert(service, hold);
+        }
         Gateway::within(memory, nodes).await
     }
 
@@ -36,8 +47,8 @@ impl KeptCalls {
             "connections" => gauges.connections() as usize,
             "dropped" => gauges.messages_dropped() as usize,
             "taken" => gauges.memory().taken(),
-            "steps" => self.steps.count(),
-            _ => self.params.count(),
+            "steps" => self.steps.borrow().len(),
+            _ => self.params.borrow().len(),
         };
         let wanted = wanted.strip_prefix("= ").and_then(range);
         let (low, high) = wanted.ok_or("no count")?;
@@ -53,10 +64,10 @@ impl KeptCalls {
         } else {
             &self.params
         };
-        if node.count() == 0 {
+        if node.borrow().is_empty() {
             return Err("no call".to_owned());
         }
-        let mut caller = node.take();
+        let mut caller = node.borrow_mut().remove(0).caller;
         match how {
             "answer" | "reply" => {
                 let values = serde_json::from_str::<Value>(&expand(text, &Default::default()));

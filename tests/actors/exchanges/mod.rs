@@ -29,7 +29,7 @@
 //! | `mark`, `elapsed 1..2` | at `elapsed`, this many ms have passed since `mark` |
 //! | `a room n`, `a take n` | connects by a pipe that holds this many bytes, takes this many out of it |
 //! | `a finish` | stops sending |
-//! | `a read 200 part` | the bytes up to the end are an answer over HTTP with this status, and contains this part |
+//! | `a read 200,404 part` | the bytes up to the end are answers to requests, as those of `request` |
 //! | `held`, `memory frames bytes` | as a first step: in place of all nodes there are two that keep their calls, `steps` of `/arm_sim/integration_step` and `params` of `/arm_sim/set_params`; with `memory`, all clients share this memory |
 //! | `steps = 1`, `params = 1` | this many calls are kept |
 //! | `answer steps json` | the oldest of them succeeds with these values, or with none, and ends; `reply` leaves it open until `release`, `refuse steps why` refuses it, `lose steps` drops it, and `gone steps` drops it if its client has left |
@@ -65,7 +65,7 @@ use std::time::Duration;
 use self::held::KeptCalls;
 use self::patterns::{check, expand, number, range};
 use self::peer::{LONG_PATIENCE, Peer, SHORT_PATIENCE, ask};
-use crate::nodes::{start_whole, work_in_this_thread};
+use crate::stage::Stage;
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
 use pendularm::actors::gateway::connection::admission::Admission;
@@ -121,6 +121,32 @@ fn admission(options: &str) -> Result<Admission, String> {
     })
 }
 
+/// Checks the statuses of the answers over HTTP, and a part of them.
+#[cfg(feature = "web")]
+fn answers(came: &str, wanted: &str) -> Result<(), String> {
+    let answers: Vec<&str> = came.split("HTTP/1.").skip(1).collect();
+    let statuses = answers.iter().filter_map(|answer| answer.get(2..5));
+    let statuses = statuses.collect::<Vec<_>>().join(",");
+    let (expected, part) = wanted.split_once(' ').unwrap_or((wanted, ""));
+    let has_part = part
+        .strip_prefix('!')
+        .map_or_else(|| came.contains(part), |part| !came.contains(part));
+    if statuses != expected || !has_part {
+        return Err(format!("{statuses}: {came}"));
+    }
+    let first = answers.first().copied().unwrap_or_default();
+    let head = first.to_ascii_lowercase();
+    let head = head.split("\r\n\r\n").next().unwrap_or_default();
+    let is_strict = STRICT.iter().all(|line| head.contains(line))
+        && NEVER.iter().all(|line| !head.contains(line))
+        && (head.contains("200 ok") || !head.contains("set-cookie"));
+    if expected == "101" || is_strict {
+        Ok(())
+    } else {
+        Err(format!("not strict: {first}"))
+    }
+}
+
 /// A runtime, its clients by their names, and the values that patterns have bound.
 struct World {
     gateway: Gateway,
@@ -136,10 +162,9 @@ struct World {
 
 impl World {
     async fn start<const N: usize>() -> Self {
-        let gateway = Gateway::bare().await;
-        let (registry, gauges) = (&gateway.registry, &gateway.gauges);
-        work_in_this_thread(start_whole::<N>(registry, gauges, 1).await.1);
-        Self::at(gateway, N, KeptCalls::default())
+        let stage = Stage::<N>::start().await;
+        stage.compute();
+        Self::at(stage.gateway, N, KeptCalls::default())
     }
 
     /// A gateway with the two nodes that keep their calls.
@@ -168,7 +193,7 @@ impl World {
     async fn connect(&self, name: &str, room: usize) -> Peer {
         let ours = self.open(room);
         let stream = if name.starts_with('w') {
-            pipe::Client::web_on(ours, LONG_PATIENCE, "127.0.0.1:9095", "/").await
+            pipe::Client::web_on(ours, LONG_PATIENCE).await
         } else {
             pipe::Client::on(ours, LONG_PATIENCE)
         };
@@ -191,28 +216,7 @@ impl World {
             .await
             .map_err(|_| "no end")?
             .map_err(|_| "no orderly end")?;
-        let came = String::from_utf8_lossy(&came);
-        let answers: Vec<&str> = came.split("HTTP/1.").skip(1).collect();
-        let statuses = answers.iter().filter_map(|answer| answer.get(2..5));
-        let statuses = statuses.collect::<Vec<_>>().join(",");
-        let (expected, part) = wanted.split_once(' ').unwrap_or((wanted, ""));
-        let has_part = part
-            .strip_prefix('!')
-            .map_or_else(|| came.contains(part), |part| !came.contains(part));
-        if statuses != expected || !has_part {
-            return Err(format!("{statuses}: {came}"));
-        }
-        let first = answers.first().copied().unwrap_or_default();
-        let head = first.to_ascii_lowercase();
-        let head = head.split("\r\n\r\n").next().unwrap_or_default();
-        let is_strict = STRICT.iter().all(|line| head.contains(line))
-            && NEVER.iter().all(|line| !head.contains(line))
-            && (head.contains("200 ok") || !head.contains("set-cookie"));
-        if expected == "101" || is_strict {
-            Ok(())
-        } else {
-            Err(format!("not strict: {first}"))
-        }
+        answers(&String::from_utf8_lossy(&came), wanted)
     }
 
     async fn step(&mut self, line: &str) -> Result<(), String> {
@@ -356,17 +360,13 @@ impl World {
                 peer.stream.finish().await;
                 settle().await;
             }
+            #[cfg(feature = "web")]
             "read" => {
                 let mut bytes = Vec::new();
                 let reading = peer.stream.stream().read_to_end(&mut bytes);
                 let read = timeout(LONG_PATIENCE, reading).await;
                 read.map_err(|_| "no end")?.map_err(|_| "no orderly end")?;
-                let (status, part) = rest.split_once(' ').unwrap_or((rest, ""));
-                let text = String::from_utf8_lossy(&bytes);
-                let head = format!("HTTP/1.1 {status} ");
-                if !(text.starts_with(&head) && text.contains(part)) {
-                    return Err(text.into_owned());
-                }
+                answers(&String::from_utf8_lossy(&bytes), rest)?;
             }
             "count" => peer.count(given, wanted, &mut self.bound).await?,
             "leave" => {

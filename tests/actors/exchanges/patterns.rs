@@ -19,6 +19,8 @@ use pendularm::protocol::ros::parameters::MAX_NAMED;
 use pendularm::services::trajectory::MAX_POINTS;
 #[cfg(feature = "web")]
 use pendularm::web::head::{MAX_HEAD, MAX_HEADERS};
+#[cfg(feature = "web")]
+use pendularm::web::stream::IDLE_TIME;
 use serde_json::Value;
 
 /// Limits in place of numbers. Times are in ms. `ENTRIES_OF_5` entries with 5 bytes of names are the most that a client
@@ -28,6 +30,8 @@ const LIMITS: &[(&str, usize)] = &[
     ("DEFAULT_TIMEOUT", ms(DEFAULT_TIMEOUT)),
     ("FRAME_TIME", ms(FRAME_TIME)),
     ("HEAD_TIME", ms(HEAD_TIME)),
+    #[cfg(feature = "web")]
+    ("IDLE_TIME", ms(IDLE_TIME)),
     ("ENTRIES_OF_5", MAX_REGISTERED / (ENTRY_BYTES + 3 * 5)),
     ("ENTRIES_OF_12", MAX_REGISTERED / (ENTRY_BYTES + 3 * 12)),
     ("ENTRIES_OF_1000", MAX_REGISTERED / (ENTRY_BYTES + 3 * 1000)),

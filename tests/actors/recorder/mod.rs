@@ -17,8 +17,9 @@ use pendularm::record::{
 use serde_json::json;
 use tokio::time::{Instant, sleep};
 
-use crate::stage::{Client, Stage, ms};
+use crate::stage::{Stage, ms};
 use crate::system::in_virtual_time;
+use crate::virtual_time::Client;
 
 /// Entries in the order in which they are reported.
 #[derive(Clone, Default)]
@@ -56,7 +57,7 @@ impl Notes {
             }
         });
         let set_tap = SetTap(Some(tap));
-        stage.registry.send(set_tap).await.unwrap();
+        stage.gateway.registry.send(set_tap).await.unwrap();
     }
 }
 
@@ -87,7 +88,7 @@ pub fn replayed(entries: &[RecordEntry]) -> ReplayVerdict {
 
 async fn stop<const N: usize>(stage: &Stage<N>) {
     stage.arm.send(SetListener::<N>(None)).await.unwrap();
-    stage.registry.send(SetTap(None)).await.unwrap();
+    stage.gateway.registry.send(SetTap(None)).await.unwrap();
 }
 
 /// Sends a path of two points, which takes a third of a second.

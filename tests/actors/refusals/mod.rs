@@ -4,9 +4,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::nodes::{start_whole, work_in_this_thread};
+use crate::stage::Stage;
 use crate::system::in_virtual_time;
-use crate::virtual_time::{Gateway, Peer, WIDE};
+use crate::virtual_time::Client;
 use pendularm::protocol::catalog::Service;
 use serde_json::{Value, json};
 
@@ -62,19 +62,18 @@ fn first_rows(service: Service) -> Vec<Row> {
     fields.filter_map(|field| of(field.name)).copied().collect()
 }
 
-/// A gateway with the nodes of all services but the recorder; the arm is paused.
-async fn start<const N: usize>() -> (Gateway, Peer) {
-    let gateway = Gateway::bare().await;
-    let (registry, gauges) = (&gateway.registry, &gateway.gauges);
-    work_in_this_thread(start_whole::<N>(registry, gauges, 1).await.1);
-    let mut client = gateway.connect(WIDE);
+/// The nodes of all services but the recorder; the arm is paused.
+async fn start<const N: usize>() -> (Stage<N>, Client) {
+    let stage = Stage::start().await;
+    stage.compute();
+    let mut client = stage.connect();
     call(&mut client, "/arm_sim/pause", "{\"data\":true}").await;
     call(&mut client, "/arm_sim/reset", "{}").await;
-    (gateway, client)
+    (stage, client)
 }
 
-async fn call(client: &mut Peer, service: &str, args: &str) -> Value {
-    let frame = format!("{{\"op\":\"call_service\",\"service\":\"{service}\",\"args\":{args}}}\n");
+async fn call(client: &mut Client, service: &str, args: &str) -> Value {
+    let frame = format!("{{\"op\":\"call_service\",\"service\":\"{service}\",\"args\":{args}}}");
     client.send_text(&frame).await;
     client
         .receive_where(|frame| frame["op"] == "service_response")
@@ -82,7 +81,7 @@ async fn call(client: &mut Peer, service: &str, args: &str) -> Value {
 }
 
 /// All settings, as their services return them.
-async fn settings(client: &mut Peer) -> BTreeMap<&'static str, Value> {
+async fn settings(client: &mut Client) -> BTreeMap<&'static str, Value> {
     let mut settings = BTreeMap::new();
     for (service, _) in FIELD_BY_FIELD {
         let answer = call(client, service, "{}").await;
@@ -131,7 +130,7 @@ fn request(service: &str, changes: &[(&str, &str)]) -> String {
     format!("{{{}}}", members.join(","))
 }
 
-async fn assert_refused(client: &mut Peer, rows: &[Row]) {
+async fn assert_refused(client: &mut Client, rows: &[Row]) {
     let before = settings(client).await;
     for [service, field, literal, status] in rows {
         let answer = call(client, service, &request(service, &[(field, literal)])).await;
@@ -147,9 +146,9 @@ async fn assert_refused(client: &mut Peer, rows: &[Row]) {
 #[test]
 fn every_bad_literal_is_refused_with_its_row_and_changes_nothing() {
     in_virtual_time(async {
-        let (_gateway, mut client) = start::<2>().await;
+        let (_stage, mut client) = start::<2>().await;
         assert_refused(&mut client, &rows_of_2_links()).await;
-        let (_gateway, mut client) = start::<3>().await;
+        let (_stage, mut client) = start::<3>().await;
         assert_refused(&mut client, &rows(include_str!("rows_3_links.txt"))).await;
     });
 }
@@ -172,7 +171,7 @@ fn every_field_of_every_service_has_a_row() {
 #[test]
 fn all_that_is_wrong_is_listed_at_once() {
     in_virtual_time(async {
-        let (_gateway, mut client) = start::<2>().await;
+        let (_stage, mut client) = start::<2>().await;
         for service in Service::ALL {
             let rows = first_rows(service);
             let bad: Vec<_> = rows.iter().map(|row| (row[1], row[2])).collect();
@@ -194,7 +193,7 @@ fn all_that_is_wrong_is_listed_at_once() {
 #[test]
 fn every_service_needs_its_required_fields_and_answers_with_those_of_its_row() {
     in_virtual_time(async {
-        let (_gateway, mut client) = start::<2>().await;
+        let (_stage, mut client) = start::<2>().await;
         let served = Service::ALL.into_iter();
         for service in served.filter(|one| !one.name().starts_with("/recorder")) {
             let name = service.name();
@@ -233,7 +232,7 @@ fn valid_fields_take_effect_beside_a_rejected_one() {
         for (service, good) in FIELD_BY_FIELD {
             let good: Value = serde_json::from_str(good).unwrap();
             for row in first_rows(Service::from_name(service).unwrap()) {
-                let (_gateway, mut client) = start::<2>().await;
+                let (_stage, mut client) = start::<2>().await;
                 let mut expected = call(&mut client, service, "{}").await["values"].clone();
                 let others = good.as_object().unwrap().iter();
                 let others: Vec<_> = others.filter(|(name, _)| *name != row[1]).collect();

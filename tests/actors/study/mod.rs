@@ -14,9 +14,9 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use crate::askers::{PATIENCE, PoolBench, ask_as};
-use crate::stage::{ms, pass, stand_in};
+use crate::stage::ms;
 use crate::system::in_virtual_time;
-use crate::virtual_time::{Gateway, Peer, WIDE};
+use crate::virtual_time::{Client, Gateway, WIDE, stand_in};
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
     ArmSettings, AttachNodes, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetParams,
@@ -86,7 +86,7 @@ pub fn study<const N: usize>() -> PoolBench<Study<N>> {
 }
 
 /// A client that calls the node.
-async fn caller_of<const N: usize>(bench: &PoolBench<Study<N>>) -> Peer {
+async fn caller_of<const N: usize>(bench: &PoolBench<Study<N>>) -> Client {
     let mut nodes = Nodes::default();
     Study::attach(&bench.node, &mut nodes);
     Gateway::with(nodes).await.connect(WIDE)

@@ -59,7 +59,7 @@ async fn turns_until_integrated(others: u64) -> u32 {
         ask_as(&study, connection, &answered, heavy());
     }
     // The study first queries the arm. Some virtual time passes when all tasks wait.
-    pass(ms(1)).await;
+    sleep(ms(1)).await;
     for _ in 0..10 * others {
         assert!(pool.turn());
     }
@@ -72,7 +72,7 @@ async fn turns_until_integrated(others: u64) -> u32 {
         ..IntegrationStep::default()
     };
     let mut honest = ask_as(&integration, 100, &answered, step);
-    pass(ms(1)).await;
+    sleep(ms(1)).await;
     let mut turns = 0;
     while honest.ended.try_recv() == Err(oneshot::error::TryRecvError::Empty) {
         assert!(pool.turn());

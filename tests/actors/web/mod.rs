@@ -12,9 +12,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::system::in_virtual_time;
-use crate::virtual_time::{Gateway, Node, WIDE, assert_elapsed, settle, turns_of_others};
+use crate::virtual_time::{Gateway, WIDE, route, settle, turns_of_others};
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::node::ServiceCall;
 use pendularm::protocol::catalog::Service;
 use pendularm_client::pipe::Client;
 use pendularm_client::websocket::{LAST, append, opcode};
@@ -29,7 +30,7 @@ fn connect(gateway: &Gateway, room: usize) -> DuplexStream {
 
 async fn open(gateway: &Gateway, room: usize) -> Client<DuplexStream> {
     let stream = connect(gateway, room);
-    Client::web_on(stream, Duration::from_secs(3600), "127.0.0.1:9095", "/").await
+    Client::web_on(stream, Duration::from_secs(3600)).await
 }
 
 /// Most bytes that are read or written before other tasks have a turn.

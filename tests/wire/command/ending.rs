@@ -35,14 +35,8 @@ fn verb(command: &str) -> String {
     words.join(" ")
 }
 
-fn program(line: &str) -> Command {
-    let mut command = common::program();
-    command.args(line.split(' ')).stdin(Stdio::null());
-    command
-}
-
 fn output(line: &str) -> Output {
-    program(line).output().unwrap()
+    common::run(&line.split(' ').collect::<Vec<_>>())
 }
 
 #[test]
@@ -68,7 +62,8 @@ fn a_token_is_shown_from_the_option_or_the_variable() {
     complaint(&output(&format!("{list} --token open-sesame-once-less")), 1);
     let right = output(&format!("{list} --token {token}"));
     assert_eq!(right.status.code(), Some(0));
-    let mut command = program(&list);
+    let mut command = common::program();
+    command.args(list.split(' '));
     command.env("ARM_SIM_TOKEN", token);
     assert_eq!(command.output().unwrap().status.code(), Some(0));
     command.env("ARM_SIM_TOKEN", "short");

@@ -1,13 +1,14 @@
 //! The commands against a hostile server: they end in time, with a message, and hold little of its data.
 
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::thread;
 use std::time::Duration;
 
 use serde_json::{Value, json};
 
+use super::Going;
 use crate::common;
 
 /// A server that answers requests for types, topics and parameters, and does `then` at the first other frame after the
@@ -38,34 +39,12 @@ fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
 }
 
 /// A command that contacts that server.
-fn start(arguments: &[&str], address: &str) -> Child {
+fn start(arguments: &[&str], address: &str) -> Going {
     start_by(common::program(), arguments, address)
 }
 
-fn start_by(mut program: Command, arguments: &[&str], address: &str) -> Child {
-    program
-        .args(arguments)
-        .args(["--connect", address])
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    program.spawn().unwrap()
-}
-
-/// Exit status, standard output and standard error of a command that has to end by itself within `common::PATIENCE`.
-#[track_caller]
-fn end(mut child: Child) -> (Option<i32>, String, String) {
-    fn all(mut from: impl std::io::Read + Send + 'static) -> thread::JoinHandle<String> {
-        thread::spawn(move || {
-            let mut text = String::new();
-            from.read_to_string(&mut text).unwrap();
-            text
-        })
-    }
-    let out = all(child.stdout.take().unwrap());
-    let complaint = all(child.stderr.take().unwrap());
-    let status = common::end(&mut child).0.code();
-    (status, out.join().unwrap(), complaint.join().unwrap())
+fn start_by(mut program: Command, arguments: &[&str], address: &str) -> Going {
+    Going::of(program.args(arguments).args(["--connect", address]))
 }
 
 /// Repeats the same bytes until the client stops reading.
@@ -87,7 +66,7 @@ fn an_unexpected_frame_extends_no_timeout() {
     for command in [ECHO, CALL, GOAL] {
         for bytes in [FOREIGN, b" "] {
             let arguments = [&command[..], &["--timeout", "0.3"]].concat();
-            let (status, out, complaint) = end(start(&arguments, &server(drip(bytes))));
+            let (status, out, complaint) = start(&arguments, &server(drip(bytes))).end();
             assert_eq!((status, out.as_str()), (Some(3), ""), "{command:?}");
             let expected = "pendularm: no answer or message within 0.3 s\n";
             assert_eq!(complaint, expected, "{command:?}");
@@ -121,7 +100,7 @@ fn a_server_that_closes_or_gives_no_answer_ends_a_command_with_status_3() {
             }
         });
         let arguments = [&CALL[..], &["--timeout", timeout]].concat();
-        let (status, out, complaint) = end(start(&arguments, &address));
+        let (status, out, complaint) = start(&arguments, &address).end();
         assert_eq!((status, out.as_str()), (Some(3), ""), "{why}");
         assert!(complaint.contains(why), "{complaint}");
     }
@@ -138,7 +117,7 @@ fn each_message_has_the_whole_time_to_come() {
         }
     });
     let arguments = [&ECHO[..], &["--timeout", "5", "-n", "5"]].concat();
-    let (status, out, complaint) = end(start(&arguments, &address));
+    let (status, out, complaint) = start(&arguments, &address).end();
     assert_eq!((status, complaint.as_str()), (Some(0), ""));
     assert_eq!(out, "1\n---\n".repeat(5));
 }
@@ -146,7 +125,7 @@ fn each_message_has_the_whole_time_to_come() {
 #[test]
 fn the_text_of_a_parameter_acts_on_no_terminal() {
     let command = ["param", "get", "/arm_sim", "robot_description"];
-    let (status, out, _) = end(start(&command, &server(|_| {})));
+    let (status, out, _) = start(&command, &server(|_| {})).end();
     assert_eq!((status, out.as_str()), (Some(0), "one\\u{1b}[2J\nother\n"));
 }
 
@@ -169,7 +148,7 @@ fn say(msg: String) -> impl Fn(&mut TcpStream) + Send {
 
 /// A command that may use this many kilobytes of memory.
 #[cfg(target_os = "linux")]
-fn start_within(kilobytes: u32, arguments: &[&str], address: &str) -> Child {
+fn start_within(kilobytes: u32, arguments: &[&str], address: &str) -> Going {
     let limited = common::shell(&format!("ulimit -v {kilobytes}"));
     start_by(limited, arguments, address)
 }
@@ -187,7 +166,7 @@ fn values_that_say_nothing_to_a_command_are_not_spread_out() {
             let _ = stream.write_all((foreign + answer).as_bytes());
             hold(stream);
         });
-        let (status, out, complaint) = end(start_within(200_000, &CALL, &address));
+        let (status, out, complaint) = start_within(200_000, &CALL, &address).end();
         assert_eq!((status, complaint.as_str()), (Some(0), ""), "{member}");
         assert_eq!(out, "{}\n", "{member}");
     }
@@ -202,10 +181,10 @@ fn yaml_is_printed_before_all_of_it_is_written() {
     let address = server(say(msg));
     let arguments = [&ECHO[..], &["--once"]].concat();
     let mut child = start_within(200_000, &arguments, &address);
-    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let lines = child.1.by_ref().lines();
     let last = lines.map(Result::unwrap).enumerate().last();
     assert_eq!(last, Some((count + 1, "---".to_owned())));
-    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert_eq!(child.end().0, Some(0));
 }
 
 #[test]
@@ -215,7 +194,7 @@ fn a_frame_that_no_runtime_sends_is_read_no_further() {
             let chunk = [b' '; 1 << 16];
             while stream.write_all(&chunk).is_ok() {}
         });
-        let (status, out, complaint) = end(start(&command, &address));
+        let (status, out, complaint) = start(&command, &address).end();
         assert_eq!((status, out.as_str()), (Some(3), ""));
         let expected = "pendularm: the connection ended: a frame is longer than 83886080 bytes\n";
         assert_eq!(complaint, expected);

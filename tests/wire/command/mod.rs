@@ -10,8 +10,9 @@ mod table;
 mod topics;
 mod yaml;
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Output, Stdio};
+use std::thread::{self, JoinHandle};
 
 use serde_json::Value;
 
@@ -113,13 +114,19 @@ impl Going {
         signal(self.0.id(), "TERM");
     }
 
-    /// Exit status, the rest of standard output, and standard error.
+    /// Exit status, the rest of standard output, and standard error. It has to end by itself within `common::PATIENCE`.
+    #[track_caller]
     pub fn end(self) -> (Option<i32>, String, String) {
-        let Self(child, mut lines) = self;
-        let mut rest = String::new();
-        std::io::Read::read_to_string(&mut lines, &mut rest).unwrap();
-        let output = child.wait_with_output().unwrap();
-        let complaint = String::from_utf8(output.stderr).unwrap();
-        (output.status.code(), rest, complaint)
+        fn all(mut from: impl Read + Send + 'static) -> JoinHandle<String> {
+            thread::spawn(move || {
+                let mut text = String::new();
+                from.read_to_string(&mut text).unwrap();
+                text
+            })
+        }
+        let Self(mut child, lines) = self;
+        let (rest, complaint) = (all(lines), all(child.stderr.take().unwrap()));
+        let status = common::end(&mut child).0.code();
+        (status, rest.join().unwrap(), complaint.join().unwrap())
     }
 }

@@ -32,7 +32,7 @@ fn fault(runtime: &Runtime, row: &str) -> Option<String> {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let part: String = serde_json::from_str(&format!("\"{part}\"")).expect(row);
     let output = match status.strip_prefix('!') {
-        Some(_) => common::program().args(arguments).output().unwrap(),
+        Some(_) => common::run(&arguments),
         None => command(runtime, &arguments).output().unwrap(),
     };
     let status = status.trim_start_matches('!');

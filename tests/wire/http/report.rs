@@ -7,6 +7,7 @@ use std::process::Command;
 use crate::common::Runtime;
 use crate::folder::Folder;
 use crate::web_client::get;
+use pendularm::web::report::MAX_FILE;
 
 #[test]
 fn the_report_is_served_from_its_folder_with_a_policy_of_its_own() {
@@ -34,6 +35,11 @@ fn the_report_is_served_from_its_folder_with_a_policy_of_its_own() {
         );
         assert!(!policy.contains("script-src") && !policy.contains("connect-src"));
     }
+    let long = fs::File::create(folder.join("long.csv")).unwrap();
+    long.set_len(MAX_FILE + 1).unwrap();
+    let long = get(runtime.address, "/report/long.csv");
+    assert_eq!(long.status, 503);
+    assert!(long.text().contains("longer than 4194304 bytes"));
     let moved = get(runtime.address, "/report");
     assert_eq!(
         (moved.status, moved.header("location")),

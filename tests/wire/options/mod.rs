@@ -3,7 +3,6 @@
 //! **Invariant:** arguments are passed in; with a variable of the environment the program itself is started.
 
 mod arguments;
-mod commands;
 mod program;
 mod values;
 mod variables;

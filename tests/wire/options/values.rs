@@ -1,8 +1,9 @@
-//! The options of serving: values that are accepted, and values that are refused by name and value.
+//! Options: values that are accepted, and values that are refused by name and value.
+//! `tests/house/readme/mod.rs` has the options of `--help`, their variables and defaults.
 
-use super::{options, refusal};
+use super::{options, parse, refusal};
 use pendularm::logging::LogFormat;
-use pendularm::options::{DEFAULT_BIND, Links};
+use pendularm::options::{DEFAULT_BIND, Links, Parsed};
 use tracing::level_filters::LevelFilter;
 
 #[test]
@@ -150,4 +151,18 @@ fn hosts_and_origins_are_lists_and_the_switch_needs_no_value() {
         let options = options(&[&format!("--strict-origin={value}")]);
         assert_eq!(options.access.strict_origin, on);
     }
+}
+
+#[test]
+fn a_report_is_asked_for_with_its_directory_its_sections_and_its_haste() {
+    let report = |arguments: &[&str]| match parse(&[&["report"], arguments].concat()) {
+        Ok(Parsed::Report(report)) => report,
+        other => panic!("no report: {other:?}"),
+    };
+    let plain = report(&[]);
+    assert_eq!((plain.out.to_str(), plain.quick), (Some("report"), false));
+    assert!(plain.only.is_empty());
+    let all = report(&["--out", "here", "--only", "error,budget", "--quick"]);
+    assert_eq!((all.out.to_str(), all.quick), (Some("here"), true));
+    assert_eq!(all.only, ["error", "budget"]);
 }

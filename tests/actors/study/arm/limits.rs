@@ -9,7 +9,7 @@ fn without_subscribers_no_limit_is_asked_for_and_no_error_estimated() {
         arm.client.subscribe(Topic::ErrorEstimate.name()).await;
         arm.client.unsubscribe(Topic::ErrorEstimate.name()).await;
         arm.client.subscribe(Topic::JointStates.name()).await;
-        let (_, before) = (arm.questions().await, arm.gauges.error_estimates());
+        let (_, before) = (arm.questions().await, arm.gateway.gauges.error_estimates());
         for timestep in [0.01, 0.02, 0.03] {
             arm.ask(integrator(Some(timestep), Some(Method::Verlet)))
                 .await;
@@ -18,7 +18,7 @@ fn without_subscribers_no_limit_is_asked_for_and_no_error_estimated() {
             sleep(Duration::from_secs(2)).await;
         }
         assert_eq!(arm.questions().await, []);
-        assert_eq!(arm.gauges.error_estimates(), before);
+        assert_eq!(arm.gateway.gauges.error_estimates(), before);
     });
 }
 

@@ -6,7 +6,8 @@ use std::ops::Deref;
 
 use super::*;
 use crate::arm_steps::{enable, pause};
-use crate::stage::{Client, Stage, asked};
+use crate::stage::{Stage, asked};
+use crate::virtual_time::Client;
 use pendularm::actors::arm::sim::ArmSim;
 use pendularm::actors::node::{Ask, Call};
 
