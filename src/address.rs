@@ -17,9 +17,9 @@ const SCHEMES: [&str; 3] = ["ws", "http", "tcp"];
 /// Longest name of a host that DNS allows, in bytes.
 const MAX_NAME: usize = 253;
 /// The default port of `http`.
-const HTTP_PORT: u16 = 80;
+pub const HTTP_PORT: u16 = 80;
 /// The default port of `https`, which a proxy may use.
-const HTTPS_PORT: u16 = 443;
+pub const HTTPS_PORT: u16 = 443;
 
 /// Reads an address or a URL as `host:port`, the host in lower case. A URL's path is left out.
 #[must_use]

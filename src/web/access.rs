@@ -14,7 +14,7 @@ use hyper::header::ALLOW;
 
 use super::head::RequestHead;
 use super::response::{HttpResponse, set, text};
-use crate::address::{Authority, Host};
+use crate::address::{Authority, HTTP_PORT, HTTPS_PORT, Host};
 use crate::protocol::op::token::Token;
 use crate::protocol::wire::text::shortened;
 use crate::value::{ValueReader, needed};
@@ -65,9 +65,9 @@ pub(crate) fn read_origin(text: &str) -> Result<Box<str>, String> {
     };
     let needs = "origins, such as https://example.org, null or file://, separated by commas";
     // A browser leaves out the default port.
-    let usual = [("http://", ":80"), ("https://", ":443")].into_iter();
+    let usual = [("http://", HTTP_PORT), ("https://", HTTPS_PORT)].into_iter();
     let mut usual = usual.filter(|(scheme, _)| origin.starts_with(scheme));
-    let bare = usual.find_map(|(_, port)| origin.strip_suffix(port));
+    let bare = usual.find_map(|(_, port)| origin.strip_suffix(&format!(":{port}")));
     let origin = bare.unwrap_or(&origin);
     needed(is_origin.then(|| origin.into()), needs, text)
 }
