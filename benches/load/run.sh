@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # `make bench-load`: messages between many clients, through pendularm, redis (pub/sub) and mosquitto, the same in one run.
+# At 60 Hz also through bare actors: what any program of actors needs for a delivery.
 #
-# All three run on free ports of loopback. Each is stopped by its process id, pendularm by the client that starts it.
+# All run on free ports of loopback. Each is stopped by its process id, pendularm by the client that starts it.
 # redis-server and mosquitto come from Debian's packages. As root they are installed if missing. Takes some minutes.
 # ARGS=--quick plays each scene for a moment, without bars; KEEP=1 keeps the figures in
 # benches/results/<date>-<processor>/load/.
@@ -26,7 +27,7 @@ trap cleanup EXIT
 install_peers
 say "building (release)"
 [ -n "${PROGRAM:-}" ] || (cd "$root" && cargo build --release --locked --quiet)
-(cd "$benches" && cargo build --release --locked --quiet --no-default-features --bin load)
+(cd "$benches" && cargo build --release --locked --quiet --no-default-features --features bare --bin load --bin bare)
 program=${PROGRAM:-$built/pendularm}
 
 # Waits until a server listens on port $1. $2 is its expected name.
@@ -40,7 +41,7 @@ await() {
     fail "$2 does not listen"
 }
 
-{ read -r redis_port; read -r mosquitto_port; } < <("$built/load" ports)
+{ read -r redis_port; read -r mosquitto_port; read -r bare_port; } < <("$built/load" ports)
 
 # Every setting that would drop a message or write one to a disk is off.
 redis-server --bind 127.0.0.1 --port "$redis_port" --dir "$scratch" --save '' --appendonly no --maxclients 2000 \
@@ -64,8 +65,12 @@ chmod 644 "$scratch/mosquitto.conf"
 mosquitto -c "$scratch/mosquitto.conf" >"$scratch/mosquitto.log" 2>&1 &
 mosquitto=$!
 pids+=("$mosquitto")
+"$built/bare" "$bare_port" 2>"$scratch/bare.log" &
+bare=$!
+pids+=("$bare")
 await "$redis_port" redis
 await "$mosquitto_port" mosquitto
+await "$bare_port" bare
 
 folder=$(results_folder)/load
 mkdir -p "$folder"
@@ -75,5 +80,5 @@ mkdir -p "$folder"
 } | tee "$folder/environment.txt"
 # shellcheck disable=SC2086 # arguments, several
 "$built/load" "$program" "redis=127.0.0.1:$redis_port=$redis" \
-    "mosquitto=127.0.0.1:$mosquitto_port=$mosquitto" ${ARGS:-} | tee "$folder/summary.txt"
+    "mosquitto=127.0.0.1:$mosquitto_port=$mosquitto" "bare=127.0.0.1:$bare_port=$bare" ${ARGS:-} | tee "$folder/summary.txt"
 [ "${KEEP:-}" != 1 ] || say "kept in benches/results/$(basename "$(dirname "$folder")")/load"

@@ -1,4 +1,5 @@
-//! The three protocols, as little of each as a publisher and a subscriber need: rosbridge JSON by line, RESP, MQTT 3.1.1.
+//! The three protocols, as little of each as a publisher and a subscriber need: rosbridge JSON by line, RESP, MQTT 3.1.1. Bare
+//! actors exchange the lines of pendularm.
 //!
 //! The load hands over millions of messages of three servers on one thread, so it looks at bytes and parses no JSON; for all else
 //! there is `pendularm-client`.
@@ -11,6 +12,7 @@ pub enum Protocol {
     Pendularm,
     Redis,
     Mosquitto,
+    Bare,
 }
 
 /// Something that a server has sent.
@@ -28,13 +30,14 @@ pub enum Event<'a> {
 }
 
 impl Protocol {
-    pub const ALL: [Self; 3] = [Self::Pendularm, Self::Redis, Self::Mosquitto];
+    pub const ALL: [Self; 4] = [Self::Pendularm, Self::Redis, Self::Mosquitto, Self::Bare];
 
     pub fn name(self) -> &'static str {
         match self {
             Self::Pendularm => "pendularm",
             Self::Redis => "redis",
             Self::Mosquitto => "mosquitto",
+            Self::Bare => "bare",
         }
     }
 
@@ -55,7 +58,7 @@ impl Protocol {
 
     pub fn subscribe(self, topic: &str, out: &mut Vec<u8>) {
         match self {
-            Self::Pendularm => line(
+            Self::Pendularm | Self::Bare => line(
                 &format!("{{\"op\":\"subscribe\",\"topic\":\"{topic}\"}}"),
                 out,
             ),
@@ -72,7 +75,7 @@ impl Protocol {
     /// Writes the opening of a publisher. Redis gets the request to answer no `PUBLISH`, because the other servers do not.
     pub fn advertise(self, topic: &str, out: &mut Vec<u8>) {
         match self {
-            Self::Pendularm => line(
+            Self::Pendularm | Self::Bare => line(
                 &format!("{{\"op\":\"advertise\",\"topic\":\"{topic}\"}}"),
                 out,
             ),
@@ -83,7 +86,7 @@ impl Protocol {
 
     pub fn publish(self, topic: &str, payload: &[u8], out: &mut Vec<u8>) {
         match self {
-            Self::Pendularm => {
+            Self::Pendularm | Self::Bare => {
                 out.extend_from_slice(b"{\"op\":\"publish\",\"topic\":\"");
                 out.extend_from_slice(topic.as_bytes());
                 out.extend_from_slice(b"\",\"msg\":");
@@ -108,7 +111,7 @@ impl Protocol {
     /// The lightest request there is that is answered: pendularm's is a call that goes through to the arm.
     pub fn ask(self, out: &mut Vec<u8>) {
         match self {
-            Self::Pendularm => line(
+            Self::Pendularm | Self::Bare => line(
                 "{\"op\":\"call_service\",\"service\":\"/arm_sim/pause\",\"args\":{}}",
                 out,
             ),
@@ -120,7 +123,7 @@ impl Protocol {
     /// The first whole event in `bytes` and how many of them it takes; `None` where more are needed.
     pub fn next(self, bytes: &[u8]) -> Option<(Event<'_>, usize)> {
         match self {
-            Self::Pendularm => next_line(bytes),
+            Self::Pendularm | Self::Bare => next_line(bytes),
             Self::Redis => next_reply(bytes),
             Self::Mosquitto => next_packet(bytes),
         }

@@ -28,8 +28,7 @@ pub(super) struct SlowClient {
 
 impl SlowClient {
     /// Bytes that may be written now. `None` if the client is not slow. It has read `read` bytes so far. The oldest of
-    /// its
-    /// `unread` bytes has the age `age`.
+    /// its `unread` bytes has the age `age`.
     pub(super) fn room(
         &mut self,
         now: Instant,

@@ -1,6 +1,6 @@
 //! Messages between many clients: pendularm beside redis (pub/sub) and mosquitto, the same messages in the same run.
 //!
-//! `load ports` prints two free ports of loopback. `load PATH/TO/pendularm SERVER=ADDRESS=PID ... [--quick]` starts
+//! `load ports` prints three free ports of loopback. `load PATH/TO/pendularm SERVER=ADDRESS=PID ... [--quick]` starts
 //! pendularm and measures it beside servers that run already, for `benches/load/run.sh`. Round after round every scene
 //! is played to each server in turn, by the same client on one thread. The processor time of the server for a delivery
 //! is compared: it depends little on other work of the machine. Fails if a message is lost, comes twice or comes out of
@@ -126,7 +126,7 @@ fn main() {
 }
 
 fn print_free_ports() {
-    let sockets = [(); 2].map(|()| TcpListener::bind("127.0.0.1:0").expect("a free port"));
+    let sockets = [(); 3].map(|()| TcpListener::bind("127.0.0.1:0").expect("a free port"));
     for socket in sockets {
         println!("{}", socket.local_addr().expect("bound").port());
     }
@@ -154,8 +154,11 @@ fn rest(pid: u32, seconds: f64) -> f64 {
 
 /// Plays a scene to each server in turn for all rounds, then once more with probes.
 fn play(scene: &Scene, servers: &[Server], plan: &Plan) -> Vec<(Protocol, Played)> {
-    let takes_part =
-        |server: &&Server| scene.traffic != Traffic::Arm || server.protocol == Protocol::Pendularm;
+    let takes_part = |server: &&Server| match server.protocol {
+        Protocol::Pendularm => true,
+        Protocol::Redis | Protocol::Mosquitto => scene.traffic != Traffic::Arm,
+        Protocol::Bare => matches!(scene.traffic, Traffic::Rate(_)),
+    };
     let servers: Vec<&Server> = servers.iter().filter(takes_part).collect();
     let mut played: Vec<(Protocol, Played)> = servers
         .iter()
@@ -180,8 +183,10 @@ fn play(scene: &Scene, servers: &[Server], plan: &Plan) -> Vec<(Protocol, Played
         }
     }
     if is_probed(scene) {
-        for (server, (_, played)) in servers.iter().zip(&mut played) {
-            probe(scene, server, plan.probed_seconds, played);
+        for (server, (protocol, played)) in servers.iter().zip(&mut played) {
+            if *protocol != Protocol::Bare {
+                probe(scene, server, plan.probed_seconds, played);
+            }
         }
     }
     played

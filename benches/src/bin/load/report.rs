@@ -109,14 +109,15 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)]) {
         let peers: Vec<_> = peers_of(scene)
             .into_iter()
             .flatten()
-            .filter(|(protocol, _)| *protocol != Protocol::Pendularm)
+            .filter(|(protocol, _)| matches!(protocol, Protocol::Redis | Protocol::Mosquitto))
             .collect();
         if !peers.is_empty() {
-            let to_best = |cost: fn(&Played) -> f64| {
+            let to_best = |one: &Played, cost: fn(&Played) -> f64| {
                 let costs = peers.iter().map(|(_, peer)| cost(peer));
-                cost(ours) / costs.fold(f64::INFINITY, f64::min)
+                cost(one) / costs.fold(f64::INFINITY, f64::min)
             };
-            let (ratio, net) = (to_best(|played| median(costs(played))), to_best(net));
+            let ratios = |one: &Played| (to_best(one, |one| median(costs(one))), to_best(one, net));
+            let (ratio, net) = ratios(ours);
             let what = format!(
                 "{}: CPU per delivery / better peer (less rest {net:.2})",
                 scene.name
@@ -129,6 +130,10 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)]) {
                 &format!("at most {most:.1}{of}"),
                 (if less_rest { net } else { ratio }) < most + 0.005,
             );
+            if let Some((_, bare)) = played.iter().find(|(one, _)| *one == Protocol::Bare) {
+                let (ratio, net) = ratios(bare);
+                println!("    bare actors beside it (less rest {net:.2}) {ratio:>39.2}");
+            }
         }
         if let Some(clock) = ours.clock {
             let what = format!("{}: simulation time / wall time", scene.name);
