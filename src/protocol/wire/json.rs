@@ -47,16 +47,17 @@ pub(crate) fn members_into<'a>(
         return Err(serde::de::Error::custom("a string, not an object"));
     }
     let mut deserializer = serde_json::Deserializer::from_str(text);
-    Members { names, values }.deserialize(&mut deserializer)?;
+    NamedValues { names, values }.deserialize(&mut deserializer)?;
     deserializer.end()
 }
 
-struct Members<'n, 'v, 'a> {
+/// Reads the values of some names out of an object.
+struct NamedValues<'n, 'v, 'a> {
     names: &'n [&'n str],
     values: &'v mut [Option<&'a RawValue>],
 }
 
-impl<'a> DeserializeSeed<'a> for Members<'_, '_, 'a> {
+impl<'a> DeserializeSeed<'a> for NamedValues<'_, '_, 'a> {
     type Value = ();
 
     fn deserialize<D: Deserializer<'a>>(self, deserializer: D) -> Result<(), D::Error> {
@@ -64,7 +65,7 @@ impl<'a> DeserializeSeed<'a> for Members<'_, '_, 'a> {
     }
 }
 
-impl<'a> Visitor<'a> for Members<'_, '_, 'a> {
+impl<'a> Visitor<'a> for NamedValues<'_, '_, 'a> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -1,14 +1,14 @@
 //! The registry has every client, topic and service. It fans messages out to subscribers, and routes calls.
 //!
 //! This file has its state, its messages and the path of an op. `joining.rs` has the clients that join and leave,
-//! `subscriptions.rs`, `publishing.rs` and `requests.rs` the rosbridge ops, `forms.rs` the messages that are encoded in
+//! `subscriptions.rs`, `publishing.rs` and `requests.rs` the rosbridge ops, `encoding.rs` the messages that are encoded in
 //! another form, and `actors/graph/` the tables.
 //!
 //! **Invariant:** a message is encoded once for each spelling and form, and not at all without subscribers. A
 //! refused op changes nothing. It gets an error status, or the call's one response. Messages of one sender take effect
 //! in the order sent: the registry has one mailbox, and so has each connection.
 
-mod forms;
+mod encoding;
 mod joining;
 mod publishing;
 mod requests;
