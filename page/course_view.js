@@ -11,13 +11,13 @@ import { duration, inPageNames, METHODS, multipleOf, partOf, seconds, shortName 
 import { ENERGY, newest, record, VELOCITY } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
 import { drawLadder, settingsKey } from "./ladder_panel.js";
-import { isAlone } from "./kernel.js";
+import { isAlone, linksIn } from "./kernel.js";
 import { latestOnly } from "./latest.js";
 import { controlPeriodLimit, limitInForce, question as loopQuestion, stepsPerUpdate, verdict } from "./policy.js";
 import { rollout, setGains, setIntegrator, setParams, setPeriod, setState, step as stepArm } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { SCENES, settingsOf } from "./scenes.js";
-import { DEFAULTS } from "./settings.js";
+import { DEFAULTS, hasSettings } from "./settings.js";
 import { showForm } from "./sheet.js";
 import { state, watch, watchAll } from "./store.js";
 import { ENERGIES, StripChart } from "./strip_chart.js";
@@ -32,9 +32,6 @@ const SPAN = 5; // s of the strip chart
 const ALL_JOINTS = [true, true, true];
 const MASSES = [0.5, 1, 2]; // of the last link [kg]
 const DIVERGED = "The arm diverged. Press “Restart step”.";
-
-/** A link without settings. */
-const ONLY_STEP = /^#?(?:links=[23])?&?(?:step=\w+)?&?$/;
 
 /** The map's axes: control period [s], and damping gains as a multiple of the usual ones. */
 const PERIODS = new LogScale(1e-3, 2e-2, [1, 2, 5, 10, 20].map((ms) => [1e-3 * ms, `${ms} ms`]));
@@ -107,13 +104,18 @@ export function followLink() {
 }
 
 function open() {
-  if (isAlone && state.links > 0 && state.view === "course" && ONLY_STEP.test(location.hash)) begin();
+  if (isAlone && state.links > 0 && state.view === "course" && !hasSettings(location.hash)) begin();
   else rest();
 }
 
 /** The present step in the form of a link; empty in the workbench. */
 export function stepInLink() {
   return state.view === "course" ? `step=${at + 1}&` : "";
+}
+
+/** The number of links of the arm in this page, in the form of a link; empty if the address does not name it there. */
+export function ofLinks() {
+  return isAlone && linksIn(location.hash) ? `&links=${state.links}` : "";
 }
 
 /** Reloads the page for an arm with this number of links, at the same step or at `hash`. */
@@ -138,7 +140,7 @@ function rest() {
 function go(to) {
   if (to < 0 || to >= STEPS.length) return;
   at = to;
-  setAddress(`#step=${at + 1}`);
+  setAddress(`#step=${at + 1}${ofLinks()}`);
   begin();
   byId("course-title").focus();
 }
@@ -198,7 +200,7 @@ function show() {
   setText(byId("course-title"), one.title);
   setText(byId("course-text"), one.text);
   const lost = state.connection !== "open";
-  setText(byId("course-status"), state.links === 0 || now.began ? "" : lost ? "The connection is lost. The page reconnects by itself." : "Press “Start” to set the arm. Other viewers see the change.");
+  setText(byId("course-status"), state.links === 0 || now.began ? "" : lost ? "The connection is lost. The page reconnects by itself." : `Press “Start” to set the arm.${isAlone ? "" : " Other viewers see the change."}`);
   setText(byId("course-start"), now.began ? "Restart step" : "Start");
   if (lost) passFocus(byId("course-start"), byId("course-title"));
   byId("course-start").disabled = state.links === 0 || lost;

@@ -7,7 +7,7 @@ import { announce, byId, el, keepChoice, remembered } from "./dom.js";
 import { METHODS } from "./format.js";
 import { zoomPlots } from "./plots.js";
 import { cancelGoal, setIntegrator } from "./runtime.js";
-import { state } from "./store.js";
+import { state, watch } from "./store.js";
 import { push } from "./tasks_panel.js";
 import { setPaused, singleStep, togglePause } from "./transport.js";
 
@@ -43,7 +43,7 @@ const shortcuts = [
 /** @type {Map<string, () => void>} */
 const actions = new Map(shortcuts.map(([key, , act]) => /** @type {any} */ ([key, act])));
 
-/** After key 0, choosing an integrator resumes the arm. */
+/** After key 0, choosing an integrator resumes the arm, if nothing else has resumed it. */
 async function useMethod(method, name) {
   const goOn = stoppedByZero;
   stoppedByZero = false;
@@ -69,6 +69,7 @@ export function startKeyboard() {
   box.checked = remembered(SWITCH) !== "off";
   box.addEventListener("change", () => keepChoice(SWITCH, box.checked ? "on" : "off"));
   document.addEventListener("keydown", pressed);
+  watch("paused", (paused) => { if (!paused) stoppedByZero = false; });
 }
 
 function pressed(event) {

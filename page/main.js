@@ -59,7 +59,7 @@ if (innerWidth < 48.75 * parseFloat(getComputedStyle(document.documentElement).f
   for (const one of document.querySelectorAll("#controls > details:nth-of-type(n + 3)")) one.removeAttribute("open");
 }
 
-/** Clears the recording after a reset. */
+/** Clears the recording: of another run it would be one curve with the next. */
 function forget() {
   record.clear();
   redrawPlots();

@@ -32,7 +32,7 @@ let touched = -Infinity;
 let onReset = () => {};
 let beforeChange = () => {};
 
-/** `whenReset` is called at a reset of the arm, `whenChanging` before the page changes a setting. */
+/** `whenReset` is called at a reset of the arm and at a new connection, `whenChanging` before the page changes a setting. */
 export function start(whenReset, whenChanging) {
   onReset = whenReset;
   beforeChange = whenChanging;
@@ -82,6 +82,7 @@ function connection(now) {
     set("limits", nothingAsked());
     set("goal", null);
     set("trial", null);
+    onReset();
     poll();
     announce("Connected to the arm.");
   } else if (now === "lost" && before === "open") {

@@ -55,6 +55,11 @@ export function presentSettings(/** @type {any} */ { links, integrator, params, 
   };
 }
 
+/** Whether a link has settings, besides its step and its number of links. @param {string} fragment */
+export function hasSettings(fragment) {
+  return Object.values(fromFragment(fragment)).some((one) => one !== null);
+}
+
 /** @param {Settings} settings @param {number} links */
 export function toFragment({ integrator, params, gains, period, controller, setpoint }, links) {
   const list = (/** @type {number[]} */ values) => values.map(exact).join(",");

@@ -5,10 +5,10 @@
 
 import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
-import { chooseLinks, followLink, needed, stepInLink } from "./course_view.js";
+import { chooseLinks, followLink, needed, ofLinks, stepInLink } from "./course_view.js";
 import { announce, byId, el, passFocus, setAddress, setText } from "./dom.js";
 import { isAlone, linksIn } from "./kernel.js";
-import { fromFragment, presentSettings, toFragment } from "./settings.js";
+import { fromFragment, hasSettings, presentSettings, toFragment } from "./settings.js";
 import { set, state, watch } from "./store.js";
 
 /** A link with settings but without a step opens the workbench. */
@@ -18,7 +18,7 @@ export function startViews() {
   byId("view-switch").addEventListener("click", () => show(state.view === "course" ? "workbench" : "course"));
   byId("full-screen").addEventListener("click", () => {
     if (document.fullscreenElement) document.exitFullscreen();
-    else document.documentElement.requestFullscreen?.();
+    else document.documentElement.requestFullscreen?.().catch(() => announce("Full screen is not allowed here."));
   });
   document.addEventListener("fullscreenchange", () => setText(byId("full-screen"), document.fullscreenElement ? "Leave full screen" : "Full screen"));
   startLinks();
@@ -32,6 +32,9 @@ export function startViews() {
   addEventListener("hashchange", () => {
     const view = viewInLink();
     if (!view) return; // as after the link to the arm
+    const links = linksIn(location.hash);
+    // Settings wait for a click, and bring their arm then.
+    if (isAlone && links && links !== state.links && !hasSettings(location.hash)) return chooseLinks(links, location.hash);
     set("view", view);
     followLink();
     if (state.params) offer();
@@ -54,7 +57,7 @@ function startLinks() {
 
 /** @param {"course" | "workbench"} view */
 function show(view) {
-  if (view === "workbench" && stepIn(location.hash) >= 0) setAddress(location.pathname + location.search);
+  if (view === "workbench" && stepIn(location.hash) >= 0) setAddress(location.pathname + location.search + ofLinks().replace("&", "#"));
   set("view", view);
 }
 
@@ -106,7 +109,7 @@ async function share() {
   try {
     await navigator.clipboard.writeText(link);
   } catch {
-    said = "Link is in the address bar";
+    said = window === parent ? "Link is in the address bar" : "Copying is not allowed here";
   }
   setText(byId("share-text"), said);
   announce(said);
@@ -119,7 +122,7 @@ function offer() {
   wasOffered = true;
   const settings = fromFragment(location.hash);
   const banner = byId("offer");
-  banner.hidden = !Object.values(settings).some((one) => one !== null);
+  banner.hidden = !hasSettings(location.hash);
   if (banner.hidden) return;
   const given = new URLSearchParams(location.hash.slice(1));
   const text = [...given].filter(([name]) => name !== "links" && name !== "step").map(([name, value]) => `${name} ${value}`).join(" · ").slice(0, 300);

@@ -8,7 +8,8 @@ from stage import IS_FILE, PageTest
 
 # Sends the texts of the page to the page around it.
 REPORT = """<script>setInterval(() => parent.postMessage([document.querySelector("#connection").className,
-  Number(document.querySelector("#sim-time").textContent)], "*"), 100);</script>"""
+  Number(document.querySelector("#sim-time").textContent), document.querySelector("#share-text").textContent,
+  document.querySelector("#announce-polite").textContent], "*"), 100);</script>"""
 SHOWN = "document.querySelector('#connection')?.className === 'pill open' && Number(document.querySelector('#sim-time').textContent) > 0.2"
 
 
@@ -16,11 +17,15 @@ SHOWN = "document.querySelector('#connection')?.className === 'pill open' && Num
 class AloneTest(PageTest):
     def test_it_runs_in_a_sandboxed_frame_and_its_course_goes_on_there(self):
         page = self.visit("about:blank")
-        step = """<script>setTimeout(() => document.querySelector("#course-next").click(), 500);</script>"""
+        step = """<script>setTimeout(() => document.querySelector("#course-next").click(), 500);
+          addEventListener("message", ({ data }) => document.getElementById(data)?.click());</script>"""
         page.run("addEventListener('message', ({ data }) => { window.received = data; })")
         page.run("""((text) => { const frame = document.createElement("iframe"); frame.sandbox = "allow-scripts"; frame.width = 1200;
           frame.height = 800; frame.srcdoc = text; document.body.append(frame); })(%s)""" % json.dumps(FILE.read_text() + step + REPORT))
         page.until("window.received && window.received[0] === 'pill open' && window.received[1] > 0.3", why="the arm runs in the frame")
+        for button, part, said in (("share", 2, "Copying is not allowed here"), ("full-screen", 3, "Full screen is not allowed here.")):
+            page.run(f"document.querySelector('iframe').contentWindow.postMessage('{button}', '*')")
+            page.until(f"window.received[{part}] === '{said}'")
         self.assertEqual(page.complaints, [])
 
     def test_without_a_worker_the_page_itself_runs_the_arm(self):
@@ -50,3 +55,15 @@ class AloneTest(PageTest):
         self.assertEqual(len(self.runtime.next("/joint_states")["position"]), 2)
         self.assertEqual(page.run("location.hash"), "#step=2&links=2")
         self.assertEqual(page.complaints, [])
+
+    def test_the_address_keeps_the_number_of_links_and_another_one_brings_that_arm(self):
+        page = self.page
+        for address, after in (("#links=3", "#links=3"), ("#step=4&links=2", "#step=4&links=2")):
+            page.run(f"window.old = 1; location.hash = '{address}'")
+            page.until(f"window.old === undefined && {SHOWN} && document.querySelector('#links').value === '{after[-1]}'", why="the page anew")
+            self.assertEqual(page.run("location.hash"), after)
+        page.until("document.querySelector('#course-start').textContent === 'Restart step'", why="a step that starts at once")
+        page.click("#course-next")
+        self.assertEqual(page.run("location.hash"), "#step=5&links=2")
+        page.click("#view-switch")
+        self.assertEqual(page.run("location.hash"), "#links=2")

@@ -38,6 +38,21 @@ class Reconnecting(PageTest):
         self.wait(lambda: self.runtime.call("/pid_controller/enable")["values"]["data"], "the controller")
 
 
+    def test_the_recording_begins_anew_with_the_next_runtime(self):
+        self.page.expect_network_errors = True
+        self.page.run("window.Real = WebSocket; window.WebSocket = class { static OPEN = 1; constructor() { setTimeout(() => this.onclose(), 100); } }; 0")
+        before = self.runtime.next("/clock")["clock"]["sec"]
+        self.runtime.stop()
+        self.page.until("document.querySelector('#notice').textContent.startsWith('Connection lost')")
+        self.runtime.start()
+        self.wait(lambda: self.runtime.next("/clock")["clock"]["sec"] > before + 3, "a clock that is ahead of the recording")
+        self.page.run("window.WebSocket = Real; 0")
+        self.connected()
+        oldest = "own('history.js').then(({ record, TIME }) => record.data[record.at(0) + TIME])"
+        self.page.until("own('history.js').then(({ record }) => record.length > 10)")
+        self.assertGreater(self.page.run(oldest), before + 2)
+
+
 @needs_server("no server, no connection that others could have or lose")
 class Token(PageTest):
     options = ("--token", "open-sesame-and-some-more")

@@ -1,6 +1,7 @@
 """The page's controls: drags, settings, refusals, keys, the trial, the comparison; the runtime is asked what came of it."""
 
 import math
+import time
 
 from stage import NUMBER, PageTest
 
@@ -194,6 +195,14 @@ class Controls(PageTest):
         self.page.until("document.querySelector('#pause-text').textContent === 'Run'")
         self.page.key("4")
         self.wait(lambda: not self.values("/arm_sim/pause")["data"], "a method goes on")
+        for key, text in (("0", "Run"), (" ", "Pause"), (" ", "Run")):
+            self.page.key(key)
+            self.page.until(f"document.querySelector('#pause-text').textContent === '{text}'")
+        self.page.key("3")
+        self.wait(lambda: self.values("/arm_sim/set_integrator")["method"] == "verlet", "Verlet")
+        time.sleep(0.3)
+        self.assertTrue(self.values("/arm_sim/pause")["data"], "the space bar has paused it")
+        self.page.key(" ")
         for key, on in (("c", True), ("c", False), ("x", True), ("s", False), ("s", False), ("x", True)):
             self.page.key(key)
             self.wait(lambda: self.values("/pid_controller/enable")["data"] is on, key)
