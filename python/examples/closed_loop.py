@@ -15,6 +15,8 @@ import numpy as np
 import pendularm
 
 law, host, port = sys.argv[1:] or ["lqr", "127.0.0.1", "9095"]
+if law not in ("pd", "lqr"):
+    sys.exit(f"the law must be pd or lqr, got {law}")
 wire = socket.create_connection((host, port), timeout=60).makefile("rw")
 
 

@@ -400,8 +400,8 @@ impl Simulation {
         })
     }
 
-    /// The step whose result would not be finite, if there was one since the reset. The simulation takes no step
-    /// after it.
+    /// The step whose result would not be finite, if there was one since the last `reset` or `set_state`. The
+    /// simulation takes no step after it.
     #[getter]
     fn divergence(&self, py: Python<'_>) -> Option<Divergence> {
         for_either!(&self.own, one => hold(py, one).divergence()).map(|found| Divergence {

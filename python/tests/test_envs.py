@@ -77,6 +77,8 @@ def test_some_of_the_arms_can_be_reset_alone(name):
     after, _ = env.reset(options={"reset_mask": mask})
     assert np.array_equal(after[[0, 2]], before[[0, 2]])
     assert not np.array_equal(after[1], before[1])
+    with pytest.raises(ValueError, match="options must be a dict or None, got 5"):
+        env.reset(options=5)
     with pytest.raises(ValueError, match="reset_mask must be"):
         env.reset(options={"reset_mask": [True]})
     with pytest.raises(ValueError, match=r"^reset_mask must have no masked entries, got masked_array\(data=\[True, --"):

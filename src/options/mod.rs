@@ -64,7 +64,7 @@ pub struct Options {
     #[arg(default_value = "127.0.0.1:9095")]
     #[arg(value_parser = ValueReader(read_bind))]
     pub bind: SocketAddr,
-    /// Clients served at once, at most 4096; a few places are kept for HTTP, WebSocket and the commands below
+    /// Clients served at once, at most 4096; a few places are kept for commands and, with web, for HTTP
     #[arg(long, env = "ARM_SIM_CLIENTS", value_name = "N")]
     #[arg(default_value_t = DEFAULT_CLIENTS)]
     #[arg(value_parser = ValueReader(|text| within(&(1..=MAX_CLIENTS), "a whole number", text)))]

@@ -69,17 +69,11 @@ impl<const N: usize> ContinuousLoop<N> {
             self.control.timestep,
         );
         let [dq, dv] = [moved, changed].map(|change| std::array::from_fn(|i| change[i]));
-        let (position, position_carry) = add_carried(&position, &self.carry.position, &dq);
-        let (velocity, velocity_carry) = add_carried(&velocity, &self.carry.velocity, &dv);
-        let next = State { position, velocity };
+        let (next, carry) = add_carried(&self.state, &self.carry, &dq, &dv);
         let finite = next.is_finite();
         if finite {
-            self.state = next;
+            (self.state, self.carry) = (next, carry);
             self.steps += 1;
-            self.carry = State {
-                position: position_carry,
-                velocity: velocity_carry,
-            };
             self.integral = std::array::from_fn(|i| {
                 (self.integral[i] + moved[N + i]).clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT)
             });

@@ -1,5 +1,4 @@
-//! The first unstable mode: the eigenvalue that leaves the unit circle at the limit, and the joint that moves most in
-//! it.
+//! The first unstable mode: its eigenvalue leaves the unit circle at the limit. And the joint that moves most in it.
 //!
 //! **Invariant:** the work is bounded, and the result is `None` if a value is not finite or nothing grows.
 
@@ -18,8 +17,7 @@ pub const BEYOND: f64 = 1.1;
 /// The first unstable mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Critical {
-    /// Factor by which it grows in a step of [`BEYOND`] times the limit. It is 1 if the growth is below rounding, or if
-    /// a joint only drifts.
+    /// Factor by which it grows in a step of [`BEYOND`] times the limit, 1 if the growth is below rounding.
     pub growth_per_step: f64,
     /// Its frequency \[Hz\]. If it changes sign at every step, this is half of the steps per second.
     pub frequency: f64,
@@ -49,6 +47,8 @@ pub(super) fn critical<const N: usize>(
     let fastest = generator
         .eigenvalues()
         .into_iter()
+        // The zero of a joint that only drifts is exact, and limits nothing.
+        .filter(|mu| mu.modulus() > 0.0)
         .max_by(|one, other| growth(one).total_cmp(&growth(other)))?;
     let (re, im) = (1.0 + period * fastest.re, period * fastest.im);
     let found = Critical {

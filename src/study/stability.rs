@@ -102,12 +102,12 @@ impl Modes {
     }
 
     /// Whether a mode is unstable at every timestep. It grows, or is so close to neutral that rounding decides its
-    /// sign: a double eigenvalue at zero has an error of the square root of the rounding error.
+    /// sign: a double eigenvalue near zero has an error of the square root of the rounding error.
     pub(super) fn run_away(&self) -> bool {
         let noise = 0.1 * NEUTRAL * self.rate;
         let grows = |mode: &Complex| {
-            let drifts = mode.modulus() < 1e-6 * self.rate;
-            mode.re > if drifts { -noise } else { noise } || mode.re.is_nan()
+            let is_doubtful = mode.modulus() > 0.0 && mode.modulus() < 1e-6 * self.rate;
+            mode.re > if is_doubtful { -noise } else { noise } || mode.re.is_nan()
         };
         self.slow_growth || self.eigenvalues.iter().any(grows)
     }

@@ -48,6 +48,23 @@ fn a_nilpotent_matrix_has_zeros_for_eigenvalues_and_one_that_is_not_finite_nan()
     assert!(matrix.spectral_radius().is_nan());
 }
 
+/// A drift beside a decaying mode: rounding would spread the double eigenvalue to the square root of its size.
+#[test]
+fn an_eigenvalue_of_a_state_on_which_no_other_depends_is_exact() {
+    for double in [0.0, 1.0] {
+        let matrix = Matrix::from_fn(3, |row, column| {
+            [[double, 1.0, 0.3], [0.0, double, 0.7], [0.0, 0.0, -0.9]][row][column]
+        });
+        // The same with its states in another order.
+        for order in [[0, 1, 2], [2, 0, 1], [1, 2, 0]] {
+            let mixed = Matrix::from_fn(3, |row, column| matrix[(order[row], order[column])]);
+            let mut values: Vec<f64> = mixed.eigenvalues().iter().map(|value| value.re).collect();
+            values.sort_unstable_by(f64::total_cmp);
+            assert_eq!(values, [-0.9, double, double]);
+        }
+    }
+}
+
 #[test]
 fn a_solution_satisfies_its_equations() {
     let matrix = Matrix::from_fn(3, |row, column| {

@@ -152,6 +152,28 @@ fn a_free_arm_has_the_limits_of_its_swing() {
     }
 }
 
+/// A joint without gains and without gravity only drifts. The limit is that of the other joints.
+#[test]
+fn a_joint_that_drifts_is_not_unstable() {
+    let found = |outer: f64, method| {
+        let gains = gains([100.0, 0.0], [0.0; 2], [10.0, 0.0]);
+        let setpoint = Setpoint {
+            position: [0.0, outer],
+            velocity: [0.0; 2],
+        };
+        let control = ControlLoop::new(Arm::<2>::default().weightless(), gains, setpoint);
+        limits(&control.with_method(method))
+    };
+    for method in Method::ALL {
+        for k in -15..=15 {
+            let found = found(0.2 * f64::from(k), method);
+            for limit in [found.held, found.minimum_held, found.advised] {
+                assert!(limit.unwrap() > 0.07, "{method:?}, {k}: {found:?}");
+            }
+        }
+    }
+}
+
 /// For all settings of a client a limit is either absent or a number that is not negative.
 #[test]
 fn no_parameters_make_a_limit_that_is_no_number() {

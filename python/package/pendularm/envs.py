@@ -9,7 +9,7 @@ and a process that is forked while another thread steps it must not use it.
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import gymnasium
@@ -157,7 +157,9 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         mask = np.ones(self.num_envs, np.bool_)
-        if options is not None and "reset_mask" in options:
+        if not isinstance(options, Mapping | None):
+            raise ValueError(f"options must be a dict or None, got {shown(options)}")
+        if options and "reset_mask" in options:
             given = options["reset_mask"]
             if is_masked(given):
                 raise ValueError(f"reset_mask must have no masked entries, got {shown(given)}")

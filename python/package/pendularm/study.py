@@ -31,7 +31,7 @@ class Critical:
     """The motion that grows first in the worst pose, 10 % beyond the limit."""
 
     growth_per_step: float
-    """Factor by which it grows in a step; 1 if the growth is below rounding, or if a joint only drifts."""
+    """Factor by which it grows in a step; 1 if the growth is below rounding."""
     frequency: float
     """Its frequency [Hz]; half of the steps per second if it changes its sign at every step."""
     joint: int

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._code import fingerprint
-from ._fields import Floats, flag, number, path, shown, whole_number
+from ._fields import Floats, as_array, flag, number, path, shown, whole_number
 from ._native import Batch, is_masked
 from ._pieces import Folder, PieceResults, hand_out
 from ._settings import begin, column, try_values
@@ -345,7 +345,7 @@ def _solve(question: _Question, start: int, stop: int, stopped: threading.Event 
     named = found if isinstance(found, Mapping) else {name: found}
     if hidden := [key for key, one in named.items() if is_masked(one)]:
         raise ValueError(f"metric must return no masked numbers, got some in {hidden[0]!r}")
-    values = {key: np.asarray(one) for key, one in named.items()}
+    values = {key: as_array(f"metric[{key!r}]", one) for key, one in named.items()}
     for key, one in values.items():
         if not isinstance(key, str):
             raise ValueError(f"metric must name its numbers by text, got {key!r}")

@@ -381,7 +381,7 @@ impl Batch {
         self.windows.time.view.clone_ref(py)
     }
 
-    /// Whether each arm has diverged since its reset, (`n_arms`,); overwritten by the next call.
+    /// Whether each arm has diverged since its last `reset` or `set_state`, (`n_arms`,); overwritten by the next call.
     #[getter]
     fn diverged(&self, py: Python<'_>) -> Py<PyAny> {
         self.windows.diverged.view.clone_ref(py)

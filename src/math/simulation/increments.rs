@@ -88,25 +88,23 @@ pub(super) fn stepped<T: Number, const N: usize>(
     let State { position, velocity } = state;
     // The motion does not depend on time, so the stages have no time.
     let (dq, dv) = increment(method, acceleration, h.like(0.0), position, velocity, h);
-    let (position, position_carry) = add_carried(position, &carry.position, &dq);
-    let (velocity, velocity_carry) = add_carried(velocity, &carry.velocity, &dv);
-    let carry = State {
-        position: position_carry,
-        velocity: velocity_carry,
-    };
-    (State { position, velocity }, carry)
+    add_carried(state, carry, &dq, &dv)
 }
 
-/// `value + carry + increment`, and its rounding error, the carry of the next step.
+/// `state + carry + (dq, dv)`, and its rounding error, the carry of the next step.
 #[inline(always)]
 pub(crate) fn add_carried<T: Number, const N: usize>(
-    value: &[T; N],
-    carry: &[T; N],
-    increment: &[T; N],
-) -> ([T; N], [T; N]) {
-    let (mut sums, mut carries) = (*value, *carry);
+    state: &State<N, T>,
+    carry: &State<N, T>,
+    dq: &[T; N],
+    dv: &[T; N],
+) -> (State<N, T>, State<N, T>) {
+    let (mut sums, mut carries) = (*state, *carry);
     for i in 0..N {
-        (sums[i], carries[i]) = two_sum(value[i], increment[i] + carry[i]);
+        (sums.position[i], carries.position[i]) =
+            two_sum(state.position[i], dq[i] + carry.position[i]);
+        (sums.velocity[i], carries.velocity[i]) =
+            two_sum(state.velocity[i], dv[i] + carry.velocity[i]);
     }
     (sums, carries)
 }

@@ -23,11 +23,21 @@ impl Matrix {
         if !self.entries.iter().all(|entry| entry.is_finite()) {
             return vec![Complex::real(f64::NAN); self.n];
         }
-        let mut matrix = self.clone();
+        // A state on which no other depends, such as the angle of a joint that only drifts, has its diagonal entry for
+        // an eigenvalue. Rounding would spread a double one to the square root of its size.
+        let mut kept: Vec<usize> = (0..self.n).collect();
+        let mut values = Vec::with_capacity(self.n);
+        let alone = |kept: &[usize], j| kept.iter().all(|&i| i == j || self[(i, j)] == 0.0);
+        while let Some(at) = kept.iter().position(|&j| alone(&kept, j)) {
+            let j = kept.remove(at);
+            values.push(Complex::real(self[(j, j)]));
+        }
+        let mut matrix = Self::from_fn(kept.len(), |i, j| self[(kept[i], kept[j])]);
         matrix.balance();
         matrix.reduce_to_hessenberg();
         matrix.balance();
-        matrix.iterate()
+        values.extend(matrix.iterate());
+        values
     }
 
     /// A diagonal similarity that makes rows and columns similar in size. It uses powers of two and is therefore exact.
