@@ -120,7 +120,7 @@ const PUSH_EFFORT = 50; // N m, as on the classic page
 const PUSH_SECONDS = 0.1;
 
 const pushEffort = option({ label: "torque", unit: "N m", value: PUSH_EFFORT });
-const pushSeconds = option({ label: "for", unit: "s", value: PUSH_SECONDS });
+const pushSeconds = option({ label: "duration", unit: "s", value: PUSH_SECONDS });
 let pushSaid;
 
 function startPush() {

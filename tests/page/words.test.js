@@ -97,3 +97,17 @@ test("a refusal keeps the runtime's names until it is shown", async () => {
   assert.equal((await refused).status, status);
   assert.equal(inPageNames(status), "kp 1 must be a number");
 });
+
+test("a refusal has the names of the page's fields", () => {
+  const shown = {
+    "kp[0] must be a number, got null; kp[1] must be a number, got null": "kp 1 must be a number; kp 2 must be a number",
+    "epsilon must be greater than 0, got -1; success_hold must be at least 0, got -1": "tolerance must be greater than 0, got -1; hold must be at least 0, got -1",
+    "phi = 2 puts the wrist 3.4 m from the base": "orientation = 2 puts the wrist 3.4 m from the base",
+    "effort[0] must be a number, got null": "torque 1 must be a number",
+    "effort must have 2 entries, got 1": "torque must have 2 entries, got 1",
+    "period must be at least 0, got -1": "control period must be at least 0, got -1",
+    'data must be true or false, got "maybe"': 'controller must be on or off, got "maybe"',
+    "masses must have 2 entries, got 1": "masses must have 2 entries, got 1",
+  };
+  for (const [status, text] of Object.entries(shown)) assert.equal(inPageNames(status), text);
+});
