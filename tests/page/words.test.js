@@ -111,3 +111,16 @@ test("a refusal has the names of the page's fields", () => {
   };
   for (const [status, text] of Object.entries(shown)) assert.equal(inPageNames(status), text);
 });
+
+test("a request with a number that is not finite is refused, because null can mean the default", async () => {
+  globalThis.WebSocket ??= { OPEN: 1 };
+  const sent = [];
+  const bridge = new Rosbridge(() => ({ readyState: 1, send: (text) => sent.push(text) }), () => {});
+  assert.equal((await bridge.call("/run", { duration: NaN })).status, "duration must be a number");
+  assert.equal((await bridge.call("/run", { params: { gravity: Infinity, masses: [1] } })).status, "params.gravity must be a number");
+  assert.equal(sent.length, 0);
+  const call = bridge.call("/run", { params: { masses: [NaN] }, integrator: "rk4", duration: 1 });
+  assert.equal(sent.length, 1, "the runtime names the entries of a list");
+  bridge.answer("page-1", { result: true });
+  assert.ok((await call).result);
+});
