@@ -261,6 +261,16 @@ class Controls(PageTest):
         page.until("document.querySelector('#offer').hidden")
         self.assertEqual(page.run("document.activeElement.id"), "arm", "the focus is not lost")
 
+    def test_a_refused_setting_of_a_link_is_shown(self):
+        for link, why in (
+            ("setpoint=1,2,3", "setpoint must have 2 entries, got 3"), ("setpoint=abc,1", "setpoint 1 must be a number"), ("gravity=", "gravity must be a number"),
+            ("method=foo&gravity=3", 'method must be one of euler, midpoint, verlet, rk4, got "foo"'), ("controller=maybe", 'controller must be on or off, got "maybe"'),
+        ):
+            self.page.run(f"location.hash = '{link}'")
+            self.page.until(f"document.querySelector('#offer .offer-text')?.textContent.startsWith('{link.split('=')[0]}')", why=link)
+            self.page.click("#offer button")
+            self.page.until(f"document.querySelector('#offer .refusal').textContent === '{why}'", why=f"{link}: {why}")
+
 class ThreeLinks(PageTest):
     links = 3
 

@@ -58,11 +58,17 @@ test("settings survive a link, once all have arrived", () => {
 });
 
 test("a link may have fewer settings, the arm's start, and unknown names, which are ignored", () => {
-  const settings = fromFragment("#kp=1,2&method=leapfrog&__proto__=1");
+  const settings = fromFragment("#kp=1,2&leapfrog=1&__proto__=1");
   assert.deepEqual(settings.gains, { kp: [1, 2] });
   assert.equal(settings.integrator, null);
   assert.deepEqual(fromFragment("#position=0.3,-1e-6&velocity=2,0").start, { position: [0.3, -1e-6], velocity: [2, 0] });
   assert.equal(fromFragment("#kp=1,2").start, undefined);
+});
+
+test("a wrong value in a link is kept, because the runtime refuses it", () => {
+  const { integrator, params, gains, period, controller, setpoint } = fromFragment("#method=leapfrog&gravity=&masses=1,&kp= &period=x&delay=maybe&controller=constructor&setpoint=");
+  assert.deepEqual([integrator, params, gains], [{ method: "leapfrog" }, { gravity: NaN, masses: [1, NaN] }, { kp: [NaN] }]);
+  assert.deepEqual([period, controller, setpoint], [{ period: NaN, delay: "maybe" }, "constructor", [NaN]]);
 });
 
 test("a slider that is dragged is one change to undo", () => {
