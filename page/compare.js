@@ -7,9 +7,9 @@
 import { Chart, circle, links as drawLinks } from "./chart.js";
 import { announce, byId, fillTable, setText } from "./dom.js";
 import { busy, option, panel } from "./field.js";
-import { duration, METHODS, significant } from "./format.js";
+import { duration, fixed, METHODS, significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
-import { describeRun, distances } from "./ladder.js";
+import { describeRun, distances, endOf } from "./ladder.js";
 import { rollout } from "./runtime.js";
 import { Axis, LogScale, powerOfTen, times } from "./scale.js";
 import { MOST_LINKS, state, watch } from "./store.js";
@@ -114,7 +114,8 @@ function tracked({ times: own, positions, energy }, n) {
 function showTable(found, away, reference, lasted) {
   const lines = found.map((run, i) => describeRun(run, away[i], lasted));
   fillTable(byId("compare-table"), ["method", ...COLUMNS.map(([, name]) => name)], lines.map((line, i) => [[line.name, `method${i + 1}`], ...COLUMNS.map(([key]) => line[key])]));
-  const text = `At ${duration(found[0].timestep)}, against Runge–Kutta 4 at ${duration(reference.timestep)}, for ${duration(lasted)}.`;
+  const ended = endOf(reference.times, lasted, reference.timestep);
+  const text = `At ${duration(found[0].timestep)}, against Runge–Kutta 4 at ${duration(reference.timestep)}, for ${duration(lasted)}.${ended === null ? "" : ` The reference diverged after t = ${fixed(ended, 2)} s, so no error is known.`}`;
   setText(byId("compare-text"), text);
   announce(text);
 }

@@ -183,6 +183,15 @@ class Controls(PageTest):
         self.assertAlmostEqual(float(rows[3][3].removesuffix(" rad").replace("\u2212", "-")) / error, 1, delta=0.1)
         self.assertIn("At 7 ms, against Runge–Kutta 4 at 875 µs", self.page.text("#compare-text"))
 
+    def test_a_comparison_without_a_reference_judges_no_run(self):
+        self.tab("compare")
+        self.page.run("document.querySelectorAll('#compare-form select').forEach((one, i) => { one.value = ['rest', 'on'][i]; })")
+        self.page.fill(f"#compare-form {NUMBER}", "1000")
+        self.page.until("!document.querySelector('#compare-result').hidden", 60, "a result")
+        self.assertIn("The reference diverged after t = 0.00 s, so no error is known.", self.page.text("#compare-text"))
+        euler = self.page.run("[...document.querySelectorAll('#compare-table tbody tr:first-child td')].map((one) => one.textContent)")
+        self.assertEqual([euler[0], euler[2]], ["–", "–"], euler)
+
     # Keys
 
     def test_keys_do_what_they_did_on_the_classic_page(self):

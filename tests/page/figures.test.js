@@ -42,6 +42,15 @@ test("a run that diverged has its time, but no energy and no error", () => {
   assert.equal(endOf([0, 0.8], 1, 0.1), 0.8);
 });
 
+test("a run is not judged by a reference that ended before it, and energy that overflowed is not known", () => {
+  const one = run(2, 1);
+  one.energy[20] = null;
+  for (const reference of [run(0, 1), run(1.5, 9)]) {
+    const { outcome, energy, error } = describeRun(one, distances(one, reference), 2);
+    assert.deepEqual([outcome, energy, error], ["–", "–", "–"]);
+  }
+});
+
 test("all methods climb the same ladder, and the cheapest run that is good enough is found for each", () => {
   assert.equal(rungs().length, 4 * TIMESTEPS.length);
   assert.equal(rungs()[0].timestep, Math.max(...TIMESTEPS));
