@@ -65,6 +65,15 @@ test("place and value of a logarithmic scale are each other's inverse", () => {
   assert.deepEqual(scale.marks.map(([, label]) => label), ["100 µs", "1 ms", "10 ms", "100 ms"]);
 });
 
+test("a value moves on a scale in the asked direction only, by no more than the factor, and stops at the ends", () => {
+  const scale = new LogScale(1e-4, 0.1);
+  const moved = (value) => [scale.moved(value, 1 / 1.1), scale.moved(value, 1), scale.moved(value, 1.1)];
+  assert.deepEqual(moved(0.01), [0.01 / 1.1, 0.01, 0.01 * 1.1]);
+  assert.deepEqual(moved(0.099), [0.099 / 1.1, 0.099, 0.1]);
+  assert.deepEqual(moved(1e-5), [1e-5, 1e-5, 1e-5 * 1.1]);
+  assert.deepEqual(moved(0.5), [0.5 / 1.1, 0.5, 0.5]);
+});
+
 test("a position out of reach is replaced by the nearest one within", () => {
   const near = (place, lengths, expected) => {
     const found = nearestInReach(place, lengths);
