@@ -192,6 +192,17 @@ class Controls(PageTest):
         euler = self.page.run("[...document.querySelectorAll('#compare-table tbody tr:first-child td')].map((one) => one.textContent)")
         self.assertEqual([euler[0], euler[2]], ["–", "–"], euler)
 
+    def test_a_wrong_time_of_a_comparison_is_refused_by_its_own_name(self):
+        self.tab("compare")
+        press = "document.querySelector('#compare-form button').click(), "  # does nothing while a comparison is computed
+        for times, why in (
+            ((10, 0), "duration must be greater than 0"), ((10, -1), "duration must be greater than 0"), ((1000, 0.5), "duration must be at least the timestep 1"),
+            ((-5, 5), "timestep must be greater than 0"), ((0, 5), "timestep must be greater than 0"),
+        ):
+            self.page.run(f"document.querySelectorAll('#compare-form {NUMBER}').forEach((one, i) => {{ one.value = {list(times)}[i]; }})")
+            self.page.until(f"{press}document.querySelector('#compare-form .refusal').textContent === '{why}'", 20, f"{times}: {why}")
+        self.assertTrue(self.page.run("document.querySelector('#compare-result').hidden"))
+
     # Keys
 
     def test_keys_do_what_they_did_on_the_classic_page(self):
