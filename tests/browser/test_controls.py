@@ -154,6 +154,8 @@ class Controls(PageTest):
         before = self.runtime.next("/ik_trial/status")["target"]
         self.page.click("#trial-skip")
         self.wait(lambda: self.runtime.next("/ik_trial/status")["target"] != before, "another target")
+        self.page.click("#controller")
+        self.page.until("document.querySelector('#trial-note').textContent === 'The controller is off, so the arm does not move to the targets.'")
         self.page.click("#trial-stop")
         self.page.until("document.querySelector('#trial-clock').textContent.startsWith('ended')")
         self.assertFalse(self.runtime.next("/ik_trial/status")["running"])
