@@ -60,16 +60,24 @@ export async function apply(/** @type {import("./settings.js").Settings} */ { in
   if (gains) answers.push(await setGains(gains));
   if (integrator) answers.push(await setIntegrator(integrator));
   if (period) answers.push(await setPeriod(period));
-  if (setpoint) sendSetpoint(setpoint);
+  if (setpoint) answers.push(setSetpoint(setpoint));
   if (start) answers.push(await setState(start.position ?? new Array(state.links).fill(0), start.velocity));
-  if (controller) answers.push(await enable(true));
+  if (controller != null && controller !== false) answers.push(await enable(controller));
   applying = false;
   return textOf(answers);
 }
 
+/** Sends the setpoint if the runtime will accept it. A message has no answer, so the refusal has the words of the services. @param {number[]} setpoint */
+function setSetpoint(setpoint) {
+  const wrong = setpoint.findIndex((angle) => !Number.isFinite(angle));
+  const status = setpoint.length !== state.links ? `setpoint must have ${state.links} entries, got ${setpoint.length}` : wrong >= 0 ? `setpoint[${wrong}] must be a number` : "";
+  if (!status) sendSetpoint(setpoint);
+  return { result: !status, status };
+}
+
 /** The refusals among these answers, with the page's names. @param {{ result: boolean, status?: string }[]} answers */
 function textOf(answers) {
-  return answers.filter((answer) => !answer.result).map((answer) => inPageNames(answer.status ?? "")).join(" ");
+  return inPageNames(answers.filter((answer) => !answer.result).map((answer) => answer.status ?? "").join("; "));
 }
 
 /** Sets all settings, from the starting pose, then running or paused. Returns the text of all refusals. @param {import("./settings.js").Settings} settings @param {boolean} paused */
@@ -80,7 +88,7 @@ export async function setScene({ controller, setpoint, ...rest }, paused) {
   // A reset changes the setpoint to the starting pose, so the setpoint is sent after it.
   const late = await apply({ integrator: null, params: null, gains: null, period: null, controller, setpoint });
   if (state.paused !== paused) await pause(paused);
-  return [early, late, textOf([answer])].filter(Boolean).join(" ");
+  return [early, late, textOf([answer])].filter(Boolean).join("; ");
 }
 
 /** Back to the starting pose. */

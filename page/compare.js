@@ -6,10 +6,10 @@
 
 import { Chart, circle, links as drawLinks } from "./chart.js";
 import { announce, byId, fillTable, setText } from "./dom.js";
-import { busy, option, panel } from "./field.js";
-import { duration, METHODS, significant } from "./format.js";
+import { busy, option, panel, withoutFigure } from "./field.js";
+import { duration, fixed, METHODS, significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
-import { describeRun, distances } from "./ladder.js";
+import { describeRun, distances, endOf } from "./ladder.js";
 import { rollout } from "./runtime.js";
 import { Axis, LogScale, powerOfTen, times } from "./scale.js";
 import { MOST_LINKS, state, watch } from "./store.js";
@@ -73,10 +73,11 @@ async function compare() {
   const still = from.input.value === "rest";
   const step = (timestep.number() ?? 1e3 * state.integrator.timestep) / 1e3;
   const asked = seconds.number() ?? SECONDS;
-  // A whole number of steps between samples, so all runs are sampled at the same times.
-  const every = Math.max(1, Math.ceil(asked / step / MOST_SAMPLES));
-  const intervals = Math.max(1, Math.round(asked / step / every));
-  const lasts = intervals * every * step;
+  // A whole number of steps between samples, so all runs are sampled at the same times. The runtime refuses wrong times.
+  const steps = step > 0 && asked >= step ? asked / step : NaN;
+  const every = Math.ceil(steps / MOST_SAMPLES);
+  const intervals = Math.round(steps / every) || 1;
+  const lasts = intervals * every * step || asked;
   const common = {
     q0: still ? zero : Array.from(state.position.subarray(0, n)), qdot0: still ? zero : Array.from(state.velocity.subarray(0, n)),
     duration: lasts, params: state.params, samples: intervals + 1,
@@ -85,7 +86,7 @@ async function compare() {
   const wanted = [...METHODS.map(([method]) => ({ integrator: method, timestep: step })), { integrator: "rk4", timestep: step * REFERENCE_PART }];
   const answers = await Promise.all(wanted.map((one) => rollout({ ...common, ...one })));
   const refused = answers.find((answer) => !answer.result);
-  said.show(refused?.status ?? "");
+  said.show(withoutFigure(refused?.status ?? ""));
   if (refused) return;
   const found = answers.map(({ values }, i) => ({ ...values, method: wanted[i].integrator, timestep: wanted[i].timestep }));
   const reference = found.pop();
@@ -114,7 +115,8 @@ function tracked({ times: own, positions, energy }, n) {
 function showTable(found, away, reference, lasted) {
   const lines = found.map((run, i) => describeRun(run, away[i], lasted));
   fillTable(byId("compare-table"), ["method", ...COLUMNS.map(([, name]) => name)], lines.map((line, i) => [[line.name, `method${i + 1}`], ...COLUMNS.map(([key]) => line[key])]));
-  const text = `At ${duration(found[0].timestep)}, against Runge–Kutta 4 at ${duration(reference.timestep)}, for ${duration(lasted)}.`;
+  const ended = endOf(reference.times, lasted, reference.timestep);
+  const text = `At ${duration(found[0].timestep)}, against Runge–Kutta 4 at ${duration(reference.timestep)}, for ${duration(lasted)}.${ended === null ? "" : ` The reference diverged after t = ${fixed(ended, 2)} s, so no error is known.`}`;
   setText(byId("compare-text"), text);
   announce(text);
 }

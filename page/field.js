@@ -65,10 +65,9 @@ export function panel(place, options, buttons, ...last) {
   return { ...said, buttons: made };
 }
 
-/** The answer without the refused figure, which is in seconds and therefore not the typed one. @param {Promise<any>} call */
-async function withoutFigure(call) {
-  const answer = await call;
-  return { ...answer, status: answer.status.replace(/, got [^,]*$/, "") };
+/** A refusal without the refused figures, which are in seconds and therefore not the typed ones. @param {string} status */
+export function withoutFigure(status) {
+  return status.replace(/, got [^,;]*(?=;|$)/g, "");
 }
 
 /**
@@ -121,7 +120,8 @@ export function numberField({ label, short = label, unit, low, high, log = false
   };
   const submit = async (value) => {
     pending += 1;
-    const answer = await said.report(unit === "ms" ? withoutFigure(commit(value)) : commit(value));
+    const answer = await commit(value);
+    said.show(answer.result ? "" : unit === "ms" ? withoutFigure(answer.status) : answer.status);
     pending -= 1;
     show();
     return answer;

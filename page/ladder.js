@@ -114,17 +114,17 @@ export function distances(run, reference) {
 /** At a larger distance it is another motion [rad]. */
 const PARTED = 0.1;
 
-/** A line of the table. @param {Run} run @param {(number | null)[]} away @param {number} seconds */
+/** A line of the table. A run is judged only by a reference that lasts as long. @param {Run} run @param {(number | null)[]} away @param {number} seconds */
 export function describeRun(run, away, seconds) {
   const ended = endOf(run.times, seconds, run.timestep);
-  const gained = Number(run.energy.at(-1)) - Number(run.energy[0]);
+  const gained = (run.energy.at(-1) ?? NaN) - (run.energy[0] ?? NaN); // an energy that overflowed is null
   const parts = run.times[away.findIndex((one) => Number(one) > PARTED)];
-  const known = /** @type {number[]} */ (away.filter((one) => one !== null));
+  const isJudged = ended === null && run.times.every((_, k) => away[k] != null);
   return {
     name: shortName(run.method),
-    outcome: ended !== null ? `diverged at t = ${fixed(ended, 2)} s` : parts === undefined ? `within ${PARTED} rad` : `${PARTED} rad off from ${fixed(parts, 2)} s on`,
-    energy: ended !== null ? "–" : `${significant(gained, 3)} J`,
-    error: ended !== null || known.length === 0 ? "–" : `${significant(Math.max(...known), 3)} rad`,
+    outcome: ended !== null ? `diverged at t = ${fixed(ended, 2)} s` : !isJudged ? "–" : parts === undefined ? `within ${PARTED} rad` : `${PARTED} rad off from ${fixed(parts, 2)} s on`,
+    energy: ended !== null || !Number.isFinite(gained) ? "–" : `${significant(gained, 3)} J`,
+    error: isJudged ? `${significant(Math.max(...away.map(Number)), 3)} rad` : "–",
     evaluations: significant(run.evaluations, 6),
     time: duration(run.wall_time),
   };

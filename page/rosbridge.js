@@ -107,6 +107,8 @@ export class Rosbridge {
   /** @returns {Promise<{values: object, result: boolean, status: string}>} */
   call(service, args = {}, timeoutMs = CALL_TIMEOUT_MS) {
     if (!this.open) return Promise.resolve(failure("not connected"));
+    const wrong = notFinite(args);
+    if (wrong) return Promise.resolve(failure(`${wrong} must be a number`));
     if (this.calls.size >= MOST_CALLS) return Promise.resolve(failure("too many calls wait for an answer"));
     const id = `page-${this.nextId}`;
     this.nextId += 1;
@@ -116,6 +118,15 @@ export class Rosbridge {
       this.send({ op: "call_service", service, id, args });
     });
   }
+}
+
+/** The path of a member that is no finite number; "" if there is none. JSON writes it as null, which can mean the default. */
+function notFinite(args, path = "") {
+  for (const [name, value] of Object.entries(args)) {
+    const wrong = typeof value === "number" && !Number.isFinite(value) ? path + name : value?.constructor === Object && notFinite(value, `${path}${name}.`);
+    if (wrong) return wrong;
+  }
+  return "";
 }
 
 function failure(status) {

@@ -130,6 +130,12 @@ export class LogScale {
     return Math.min(this.high, Math.max(this.low, value));
   }
 
+  /** `value` times `factor`, up to the end of the scale. A value beyond the end can only come nearer. @param {number} value @param {number} factor */
+  moved(value, factor) {
+    const next = value * factor;
+    return factor > 1 ? Math.max(value, Math.min(next, this.high)) : Math.min(value, Math.max(next, this.low));
+  }
+
   /** Powers of ten within, at most `most` of them. @param {number} most @param {(value: number) => string} label @returns {Marks} */
   powers(most, label) {
     const from = Math.ceil(Math.log10(this.low) - 1e-9);

@@ -2,7 +2,7 @@
 // settings before the latest changes.
 // Invariant: nothing here calls the runtime. The caller that applies settings gets its refusals.
 
-import { METHODS, exact } from "./format.js";
+import { exact } from "./format.js";
 
 /** @typedef {import("./policy.js").Gains} Gains */
 /** @typedef {import("./policy.js").Arm} Arm */
@@ -76,16 +76,20 @@ export function toFragment({ integrator, params, gains, period, controller, setp
 /** The settings in a link's fragment. Only the form is checked, because the runtime checks the values. @returns {Settings} */
 export function fromFragment(/** @type {string} */ hash) {
   const given = new URLSearchParams(hash.replace(/^#/, ""));
-  const numbers = (/** @type {string} */ name) => given.get(name)?.split(",").map(Number);
+  const number = (/** @type {string} */ text) => (text.trim() === "" ? NaN : Number(text));
+  const numbers = (/** @type {string} */ name) => given.get(name)?.split(",").map(number);
   const pick = (/** @type {string[]} */ names, /** @type {(name: string) => any} */ read) => {
     const found = names.map((name) => [name, read(name)]).filter(([, value]) => value !== undefined);
     return found.length > 0 ? Object.fromEntries(found) : null;
   };
-  const single = (/** @type {string} */ name) => (given.has(name) ? Number(given.get(name)) : undefined);
-  const method = given.get("method") ?? "";
-  const onOff = (/** @type {string} */ name) => (given.has(name) ? given.get(name) === "on" : undefined);
+  const single = (/** @type {string} */ name) => (given.has(name) ? number(given.get(name) ?? "") : undefined);
+  /** A text other than on and off is kept, so that the runtime refuses it. @returns {any} */
+  const onOff = (/** @type {string} */ name) => {
+    const text = given.get(name) ?? undefined;
+    return text === "on" || text === "off" ? text === "on" : text;
+  };
   return {
-    integrator: pick(["method", "timestep"], (name) => (name === "method" ? (METHODS.some(([known]) => known === method) ? method : undefined) : single(name))),
+    integrator: pick(["method", "timestep"], (name) => (name === "method" ? given.get(name) ?? undefined : single(name))),
     params: pick(["gravity", "masses", "lengths"], (name) => (name === "gravity" ? single(name) : numbers(name))),
     gains: pick(["kp", "ki", "kd"], numbers),
     period: pick(["period", "delay"], (name) => (name === "period" ? single(name) : onOff(name))),

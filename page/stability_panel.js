@@ -111,8 +111,7 @@ function byArrows(event) {
   const step = { ArrowLeft: [1 / FINE, 1], ArrowRight: [FINE, 1], ArrowUp: [1, FINE], ArrowDown: [1, 1 / FINE] }[event.key];
   if (!step || !state.integrator || !state.gains || !anchor) return;
   event.preventDefault();
-  const factor = factorOf(state.gains, anchor) * step[1];
-  moveTo(timesteps.within(state.integrator.timestep * step[0]), factors.within(factor));
+  moveTo(timesteps.moved(state.integrator.timestep, step[0]), factors.moved(factorOf(state.gains, anchor), step[1]));
 }
 
 const ASK_MS = 60;

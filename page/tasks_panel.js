@@ -109,7 +109,7 @@ function showTrial(trial) {
   byId("trial-progress").value = trial.duration > 0 ? Math.min(1, trial.elapsed / trial.duration) : 0;
   setText(byId("trial-error"), trial.error == null ? "" : `${fixed(trial.error, 3)} m to go`);
   const waits = trial.running && trial.action_status === "preempted";
-  setText(byId("trial-note"), waits ? "Another target replaced this one. Press Skip to continue." : trial.running && state.enabled === false ? "The controller is off, so no target can be reached." : "");
+  setText(byId("trial-note"), waits ? "Another target replaced this one. Press Skip to continue." : trial.running && state.enabled === false ? "The controller is off, so the arm does not move to the targets." : "");
   if (wasRunning && !trial.running) announce(`Trial over: ${count}.`);
   wasRunning = trial.running;
 }
@@ -120,7 +120,7 @@ const PUSH_EFFORT = 50; // N m, as on the classic page
 const PUSH_SECONDS = 0.1;
 
 const pushEffort = option({ label: "torque", unit: "N m", value: PUSH_EFFORT });
-const pushSeconds = option({ label: "for", unit: "s", value: PUSH_SECONDS });
+const pushSeconds = option({ label: "duration", unit: "s", value: PUSH_SECONDS });
 let pushSaid;
 
 function startPush() {

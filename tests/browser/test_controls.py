@@ -155,6 +155,8 @@ class Controls(PageTest):
         before = self.runtime.next("/ik_trial/status")["target"]
         self.page.click("#trial-skip")
         self.wait(lambda: self.runtime.next("/ik_trial/status")["target"] != before, "another target")
+        self.page.click("#controller")
+        self.page.until("document.querySelector('#trial-note').textContent === 'The controller is off, so the arm does not move to the targets.'")
         self.page.click("#trial-stop")
         self.page.until("document.querySelector('#trial-clock').textContent.startsWith('ended')")
         self.assertFalse(self.runtime.next("/ik_trial/status")["running"])
@@ -183,6 +185,26 @@ class Controls(PageTest):
         error = self.values("/study/rollout", q0=[0, 0], duration=4.998, timestep=0.007, integrator="rk4", reference=True)["error"]
         self.assertAlmostEqual(float(rows[3][3].removesuffix(" rad").replace("\u2212", "-")) / error, 1, delta=0.1)
         self.assertIn("At 7 ms, against Runge–Kutta 4 at 875 µs", self.page.text("#compare-text"))
+
+    def test_a_comparison_without_a_reference_judges_no_run(self):
+        self.tab("compare")
+        self.page.run("document.querySelectorAll('#compare-form select').forEach((one, i) => { one.value = ['rest', 'on'][i]; })")
+        self.page.fill(f"#compare-form {NUMBER}", "1000")
+        self.page.until("!document.querySelector('#compare-result').hidden", 60, "a result")
+        self.assertIn("The reference diverged after t = 0.00 s, so no error is known.", self.page.text("#compare-text"))
+        euler = self.page.run("[...document.querySelectorAll('#compare-table tbody tr:first-child td')].map((one) => one.textContent)")
+        self.assertEqual([euler[0], euler[2]], ["–", "–"], euler)
+
+    def test_a_wrong_time_of_a_comparison_is_refused_by_its_own_name(self):
+        self.tab("compare")
+        press = "document.querySelector('#compare-form button').click(), "  # does nothing while a comparison is computed
+        for times, why in (
+            ((10, 0), "duration must be greater than 0"), ((10, -1), "duration must be greater than 0"), ((1000, 0.5), "duration must be at least the timestep 1"),
+            ((-5, 5), "timestep must be greater than 0"), ((0, 5), "timestep must be greater than 0"),
+        ):
+            self.page.run(f"document.querySelectorAll('#compare-form {NUMBER}').forEach((one, i) => {{ one.value = {list(times)}[i]; }})")
+            self.page.until(f"{press}document.querySelector('#compare-form .refusal').textContent === '{why}'", 20, f"{times}: {why}")
+        self.assertTrue(self.page.run("document.querySelector('#compare-result').hidden"))
 
     # Keys
 
@@ -269,6 +291,16 @@ class Controls(PageTest):
         self.wait(lambda: self.values("/pid_controller/enable")["data"], "the controller")
         page.until("document.querySelector('#offer').hidden")
         self.assertEqual(page.run("document.activeElement.id"), "arm", "the focus is not lost")
+
+    def test_a_refused_setting_of_a_link_is_shown(self):
+        for link, why in (
+            ("setpoint=1,2,3", "setpoint must have 2 entries, got 3"), ("setpoint=abc,1", "setpoint 1 must be a number"), ("gravity=", "gravity must be a number"),
+            ("method=foo&gravity=3", 'method must be one of euler, midpoint, verlet, rk4, got "foo"'), ("controller=maybe", 'controller must be on or off, got "maybe"'),
+        ):
+            self.page.run(f"location.hash = '{link}'")
+            self.page.until(f"document.querySelector('#offer .offer-text')?.textContent.startsWith('{link.split('=')[0]}')", why=link)
+            self.page.click("#offer button")
+            self.page.until(f"document.querySelector('#offer .refusal').textContent === '{why}'", why=f"{link}: {why}")
 
 class ThreeLinks(PageTest):
     links = 3

@@ -172,6 +172,9 @@ class Tasks(CourseTest):
         self.page.until(press + "document.querySelector('#sheet').textContent.includes('Reason: all gains are 0')")
         self.page.fill("#own-form .option:nth-child(1) input", "")
         self.page.until(press + "document.querySelector('#own-form .refusal').textContent === 'mass 1 must be a number'")
+        self.page.fill("#own-form .option:nth-child(1) input", "1")
+        self.page.fill("#own-form .option:nth-child(11) input", "")
+        self.page.until(press + "document.querySelector('#own-form .refusal').textContent === 'gravity must be a number'")
 
     def test_a_link_that_is_followed_in_the_open_page_is_offered_in_its_view(self):
         self.page.run("location.hash = '#links=3&gravity=4'")

@@ -48,6 +48,19 @@ class BlowUp(PageTest):
         self.assertLess(abs(math.log(self.values("/arm_sim/set_integrator")["timestep"] / 2e-4)), 0.05)
         self.assertLess(abs(math.log(self.values("/pid_controller/set_gains")["kp"][0] / 4000)), 0.05)
 
+    def test_an_arrow_key_in_the_map_changes_one_quantity_in_its_direction(self):
+        present = lambda: (self.values("/arm_sim/set_integrator")["timestep"], self.values("/pid_controller/set_gains")["kp"][0])
+        self.tab("stability")
+        for timestep, steps in ((1e-5, (("ArrowLeft", 1e-5, 1000), ("ArrowUp", 1e-5, 1100), ("ArrowRight", 1.1e-5, 1100))),
+                                (0.5, (("ArrowRight", 0.5, 1100), ("ArrowDown", 0.5, 1000), ("ArrowLeft", 0.455, 1000)))):
+            self.runtime.call("/arm_sim/set_integrator", timestep=timestep)
+            self.page.until(f"own('store.js').then(({{ state }}) => state.integrator?.timestep === {timestep})")
+            self.page.run("document.querySelector('#map').focus()")
+            for key, *wanted in steps:
+                self.page.key(key)
+                self.wait(lambda: present() == tuple(wanted), f"{key}: {wanted}", 10)
+                self.page.until(f"own('store.js').then(({{ state }}) => state.integrator.timestep === {wanted[0]} && state.gains.kp[0] === {wanted[1]})")
+
     def test_one_button_recovers(self):
         self.diverge()
         button = self.page.until("[...document.querySelectorAll('#notice button')].find((one) => one.textContent.startsWith('Restart at'))?.textContent")

@@ -42,6 +42,15 @@ test("a run that diverged has its time, but no energy and no error", () => {
   assert.equal(endOf([0, 0.8], 1, 0.1), 0.8);
 });
 
+test("a run is not judged by a reference that ended before it, and energy that overflowed is not known", () => {
+  const one = run(2, 1);
+  one.energy[20] = null;
+  for (const reference of [run(0, 1), run(1.5, 9)]) {
+    const { outcome, energy, error } = describeRun(one, distances(one, reference), 2);
+    assert.deepEqual([outcome, energy, error], ["–", "–", "–"]);
+  }
+});
+
 test("all methods climb the same ladder, and the cheapest run that is good enough is found for each", () => {
   assert.equal(rungs().length, 4 * TIMESTEPS.length);
   assert.equal(rungs()[0].timestep, Math.max(...TIMESTEPS));
@@ -54,6 +63,15 @@ test("place and value of a logarithmic scale are each other's inverse", () => {
   const scale = new LogScale(1e-4, 0.1);
   assert.ok(Math.abs(scale.value(scale.place(0.003)) - 0.003) < 1e-15);
   assert.deepEqual(scale.marks.map(([, label]) => label), ["100 µs", "1 ms", "10 ms", "100 ms"]);
+});
+
+test("a value moves on a scale in the asked direction only, by no more than the factor, and stops at the ends", () => {
+  const scale = new LogScale(1e-4, 0.1);
+  const moved = (value) => [scale.moved(value, 1 / 1.1), scale.moved(value, 1), scale.moved(value, 1.1)];
+  assert.deepEqual(moved(0.01), [0.01 / 1.1, 0.01, 0.01 * 1.1]);
+  assert.deepEqual(moved(0.099), [0.099 / 1.1, 0.099, 0.1]);
+  assert.deepEqual(moved(1e-5), [1e-5, 1e-5, 1e-5 * 1.1]);
+  assert.deepEqual(moved(0.5), [0.5 / 1.1, 0.5, 0.5]);
 });
 
 test("a position out of reach is replaced by the nearest one within", () => {

@@ -58,11 +58,17 @@ test("settings survive a link, once all have arrived", () => {
 });
 
 test("a link may have fewer settings, the arm's start, and unknown names, which are ignored", () => {
-  const settings = fromFragment("#kp=1,2&method=leapfrog&__proto__=1");
+  const settings = fromFragment("#kp=1,2&leapfrog=1&__proto__=1");
   assert.deepEqual(settings.gains, { kp: [1, 2] });
   assert.equal(settings.integrator, null);
   assert.deepEqual(fromFragment("#position=0.3,-1e-6&velocity=2,0").start, { position: [0.3, -1e-6], velocity: [2, 0] });
   assert.equal(fromFragment("#kp=1,2").start, undefined);
+});
+
+test("a wrong value in a link is kept, because the runtime refuses it", () => {
+  const { integrator, params, gains, period, controller, setpoint } = fromFragment("#method=leapfrog&gravity=&masses=1,&kp= &period=x&delay=maybe&controller=constructor&setpoint=");
+  assert.deepEqual([integrator, params, gains], [{ method: "leapfrog" }, { gravity: NaN, masses: [1, NaN] }, { kp: [NaN] }]);
+  assert.deepEqual([period, controller, setpoint], [{ period: NaN, delay: "maybe" }, "constructor", [NaN]]);
 });
 
 test("a slider that is dragged is one change to undo", () => {
@@ -96,4 +102,31 @@ test("a refusal keeps the runtime's names until it is shown", async () => {
   socket.onmessage({ data: JSON.stringify({ op: "service_response", id: "page-1", status }) });
   assert.equal((await refused).status, status);
   assert.equal(inPageNames(status), "kp 1 must be a number");
+});
+
+test("a refusal has the names of the page's fields", () => {
+  const shown = {
+    "kp[0] must be a number, got null; kp[1] must be a number, got null": "kp 1 must be a number; kp 2 must be a number",
+    "epsilon must be greater than 0, got -1; success_hold must be at least 0, got -1": "tolerance must be greater than 0, got -1; hold must be at least 0, got -1",
+    "phi = 2 puts the wrist 3.4 m from the base": "orientation = 2 puts the wrist 3.4 m from the base",
+    "effort[0] must be a number, got null": "torque 1 must be a number",
+    "effort must have 2 entries, got 1": "torque must have 2 entries, got 1",
+    "period must be at least 0, got -1": "control period must be at least 0, got -1",
+    'data must be true or false, got "maybe"': 'controller must be on or off, got "maybe"',
+    "masses must have 2 entries, got 1": "masses must have 2 entries, got 1",
+  };
+  for (const [status, text] of Object.entries(shown)) assert.equal(inPageNames(status), text);
+});
+
+test("a request with a number that is not finite is refused, because null can mean the default", async () => {
+  globalThis.WebSocket ??= { OPEN: 1 };
+  const sent = [];
+  const bridge = new Rosbridge(() => ({ readyState: 1, send: (text) => sent.push(text) }), () => {});
+  assert.equal((await bridge.call("/run", { duration: NaN })).status, "duration must be a number");
+  assert.equal((await bridge.call("/run", { params: { gravity: Infinity, masses: [1] } })).status, "params.gravity must be a number");
+  assert.equal(sent.length, 0);
+  const call = bridge.call("/run", { params: { masses: [NaN] }, integrator: "rk4", duration: 1 });
+  assert.equal(sent.length, 1, "the runtime names the entries of a list");
+  bridge.answer("page-1", { result: true });
+  assert.ok((await call).result);
 });
