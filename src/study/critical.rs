@@ -1,4 +1,4 @@
-//! The first unstable mode: its eigenvalue leaves the unit circle at the limit. And the joint that moves most in it.
+//! The first unstable mode, whose eigenvalue leaves the unit circle at the limit, and the joint that moves most in it.
 //!
 //! **Invariant:** the work is bounded, and the result is `None` if a value is not finite or nothing grows.
 
@@ -48,7 +48,7 @@ pub(super) fn critical<const N: usize>(
         .eigenvalues()
         .into_iter()
         // The zero of a joint that only drifts is exact, and limits nothing.
-        .filter(|mu| mu.modulus() > 0.0)
+        .filter(|mu| mu.modulus() != 0.0)
         .max_by(|one, other| growth(one).total_cmp(&growth(other)))?;
     let (re, im) = (1.0 + period * fastest.re, period * fastest.im);
     let found = Critical {
