@@ -17,7 +17,7 @@ import { controlPeriodLimit, limitInForce, question as loopQuestion, stepsPerUpd
 import { rollout, setGains, setIntegrator, setParams, setPeriod, setState, step as stepArm } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { SCENES, settingsOf } from "./scenes.js";
-import { DEFAULTS, hasSettings } from "./settings.js";
+import { DEFAULTS, fromFragment, hasSettings } from "./settings.js";
 import { showForm } from "./sheet.js";
 import { state, watch, watchAll } from "./store.js";
 import { ENERGIES, StripChart } from "./strip_chart.js";
@@ -104,7 +104,7 @@ export function followLink() {
 }
 
 function open() {
-  if (isAlone && state.links > 0 && state.view === "course" && !hasSettings(location.hash)) begin();
+  if (isAlone && state.links > 0 && state.view === "course" && !hasSettings(fromFragment(location.hash))) begin();
   else rest();
 }
 
@@ -114,8 +114,8 @@ export function stepInLink() {
 }
 
 /** The number of links of the arm in this page, in the form of a link; empty if the address does not name it there. */
-export function ofLinks() {
-  return isAlone && linksIn(location.hash) ? `&links=${state.links}` : "";
+export function linksInLink() {
+  return isAlone && linksIn(location.hash) ? `links=${state.links}` : "";
 }
 
 /** Reloads the page for an arm with this number of links, at the same step or at `hash`. */
@@ -140,7 +140,7 @@ function rest() {
 function go(to) {
   if (to < 0 || to >= STEPS.length) return;
   at = to;
-  setAddress(`#step=${at + 1}${ofLinks()}`);
+  setAddress(`#${[`step=${at + 1}`, linksInLink()].filter(Boolean).join("&")}`);
   begin();
   byId("course-title").focus();
 }

@@ -30,10 +30,13 @@ export function refusal(...describes) {
   // Call this after a new connection, or when all settings are set again.
   watch("connection", (now) => { if (now === "open") show(""); });
   watch("anew", () => show(""));
-  /** Shows the outcome of a call, and returns its answer. @param {Promise<{result: boolean, status: string, values: any}>} call */
-  const report = async (call) => {
+  /**
+   * Shows the outcome of a call, a refusal as `words` gives it, and returns the answer. @param {Promise<{result:
+   * boolean, status: string, values: any}>} call @param {(status: string) => string} [words]
+   */
+  const report = async (call, words = (status) => status) => {
     const answer = await call;
-    show(answer.result ? "" : answer.status);
+    show(answer.result ? "" : words(answer.status));
     return answer;
   };
   return { element: text, show, report };
@@ -120,8 +123,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
   };
   const submit = async (value) => {
     pending += 1;
-    const answer = await commit(value);
-    said.show(answer.result ? "" : unit === "ms" ? withoutFigure(answer.status) : answer.status);
+    const answer = await said.report(commit(value), unit === "ms" ? withoutFigure : undefined);
     pending -= 1;
     show();
     return answer;

@@ -55,9 +55,9 @@ export function presentSettings(/** @type {any} */ { links, integrator, params, 
   };
 }
 
-/** Whether a link has settings, besides its step and its number of links. @param {string} fragment */
-export function hasSettings(fragment) {
-  return Object.values(fromFragment(fragment)).some((one) => one !== null);
+/** Whether there is any setting. @param {Settings} settings */
+export function hasSettings(settings) {
+  return Object.values(settings).some((one) => one !== null);
 }
 
 /** @param {Settings} settings @param {number} links */

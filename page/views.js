@@ -5,7 +5,7 @@
 
 import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
-import { chooseLinks, followLink, needed, ofLinks, stepInLink } from "./course_view.js";
+import { chooseLinks, followLink, linksInLink, needed, stepInLink } from "./course_view.js";
 import { announce, byId, el, passFocus, setAddress, setText } from "./dom.js";
 import { isAlone, linksIn } from "./kernel.js";
 import { fromFragment, hasSettings, presentSettings, toFragment } from "./settings.js";
@@ -34,7 +34,7 @@ export function startViews() {
     if (!view) return; // as after the link to the arm
     const links = linksIn(location.hash);
     // Settings wait for a click, and bring their arm then.
-    if (isAlone && links && links !== state.links && !hasSettings(location.hash)) return chooseLinks(links, location.hash);
+    if (isAlone && links && links !== state.links && !hasSettings(fromFragment(location.hash))) return chooseLinks(links, location.hash);
     set("view", view);
     followLink();
     if (state.params) offer();
@@ -57,7 +57,8 @@ function startLinks() {
 
 /** @param {"course" | "workbench"} view */
 function show(view) {
-  if (view === "workbench" && stepIn(location.hash) >= 0) setAddress(location.pathname + location.search + ofLinks().replace("&", "#"));
+  const links = linksInLink();
+  if (view === "workbench" && stepIn(location.hash) >= 0) setAddress(location.pathname + location.search + (links && `#${links}`));
   set("view", view);
 }
 
@@ -122,7 +123,7 @@ function offer() {
   wasOffered = true;
   const settings = fromFragment(location.hash);
   const banner = byId("offer");
-  banner.hidden = !hasSettings(location.hash);
+  banner.hidden = !hasSettings(settings);
   if (banner.hidden) return;
   const given = new URLSearchParams(location.hash.slice(1));
   const text = [...given].filter(([name]) => name !== "links" && name !== "step").map(([name, value]) => `${name} ${value}`).join(" · ").slice(0, 300);
