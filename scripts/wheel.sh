@@ -42,6 +42,7 @@ mv target/wheel-data/data/bin target/wheel-data/scripts
 # maturin takes licences from the folder of pyproject.toml.
 cp ../LICENSE-MIT ../LICENSE-APACHE .
 "$python" ../scripts/notices.py --notices NOTICE-THIRD-PARTY.txt
+bash ../scripts/page.sh python/package/pendularm/pendularm.html || say "without the page, which could not be built here"
 
 # On Linux the wheel's name has the required C library, but maturin checks only its own build.
 compatibility=()
