@@ -64,8 +64,8 @@ def page(step: int | str | None = None, *, links: int = 2, height: int = 620, **
     """The page of the runtime with an arm of its own. It needs no server and no network.
 
     ``step`` opens that step of the course; without it, a setting opens the Workbench. The settings are those of a link that *Share* copies, with
-    the same names: ``page(method="euler", timestep=0.01, kp=[900, 200], controller=True)``. `True` and `False` are *on* and *off*. The page checks
-    their values and says what is wrong with them.
+    the same names: ``page(method="euler", timestep=0.01, kp=[900, 200], controller=True)``. `True` and `False` are *on* and *off*. The page offers
+    them, applies them after a click on *Apply*, and says what is wrong with them.
 
     Raises `TypeError` for an unknown setting, and `ValueError` if ``links`` is not 2 or 3.
     """
