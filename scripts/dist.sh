@@ -17,7 +17,7 @@ mkdir dist
 
 case $system in
 linux-*)
-    export PORTABLE=1
+    export PORTABLE=1 PAGE=pendularm.html
     program=$(bash scripts/static.sh)
     cp pendularm.html dist/
     # In one folder of its own, as an archive of sources is expected to be.
