@@ -136,8 +136,6 @@ def walks(traced):
     publisher.call("/pid_controller/enable", data=True)
     reader.subscribe("/ik_action/result")
     found["goal and its result"] = traced.files(goal) - rest
-    traced.process.terminate()
-    traced.process.wait()
     return found
 
 
@@ -158,7 +156,12 @@ def listed(found):
 def main():
     subprocess.run(BUILD, cwd=ROOT, check=True)
     with tempfile.TemporaryDirectory() as folder:
-        text = listed(walks(Traced(folder)))
+        traced = Traced(folder)
+        try:
+            text = listed(walks(traced))
+        finally:
+            traced.process.kill()
+            traced.process.wait()
     print(text)
     if "--keep" in sys.argv:
         before, rest = PAPER.read_text(encoding="utf-8").split("<!-- scripts/trace.py -->\n")
