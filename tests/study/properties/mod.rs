@@ -7,6 +7,7 @@ mod advice;
 mod gains;
 mod limits;
 mod motions;
+mod requests;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
