@@ -8,6 +8,7 @@ mod gains;
 mod limits;
 mod motions;
 mod requests;
+mod zero_gains;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
