@@ -5,7 +5,8 @@ import { announce, warn } from "./dom.js";
 import { inPageNames, METHODS } from "./format.js";
 import { Kernel, isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
-import { answerInForce, keepAnswer, motionHasChanged, question } from "./policy.js";
+import { answerInForce, keepAnswer, motionHasChanged } from "./policy.js";
+import { gainsArgs, loopKey, questionOf, rolloutArgs, stabilityArgs } from "./question.js";
 import { Rosbridge } from "./rosbridge.js";
 import { MOST_LINKS, nothingAsked, set, state, tell, watch } from "./store.js";
 
@@ -48,7 +49,7 @@ export function start(whenReset, whenChanging) {
   bridge.subscribe("/ik_trial/status", (msg) => set("trial", msg));
   pace();
   setInterval(poll, POLL_MS);
-  watch(["integrator", "gains", "params", "enabled", "setpoint", "links"], askStability);
+  watch(["integrator", "gains", "params", "period", "enabled", "setpoint", "links"], askStability);
   watch(["params", "enabled"], () => {
     set("pushed", false);
     if (state.goal?.outcome === "reached") set("goal", null); // the arm is not at the goal any more
@@ -80,6 +81,7 @@ function connection(now) {
     // It may be another or a restarted runtime, so all old values are discarded.
     state.setpointKnown = false;
     set("limits", nothingAsked());
+    set("diagnostics", null);
     set("goal", null);
     set("trial", null);
     onReset();
@@ -173,6 +175,8 @@ function diagnostics(msg) {
   if (report.state !== "diverged") keep("paused", report.state === "paused");
   // Limits of an arm that diverges are those of its wild motion.
   if (before === "diverged" && report.state !== before) set("limits", nothingAsked());
+  // The settings at a divergence are known only if the page has seen it.
+  if (report.state !== before) state.broken = report.state === "diverged" && before ? questionOf(state) : null;
   set("diagnostics", report);
   keep("diverged", report.state === "diverged");
   if (motionHasChanged(answerInForce(state), report)) askNow();
@@ -242,10 +246,15 @@ export const cancelGoal = () => bridge.call("/ik_action/cancel_goal");
 export const trialStart = (args) => bridge.call("/ik_trial/start", args);
 export const trialSkip = () => bridge.call("/ik_trial/skip");
 export const trialStop = () => bridge.call("/ik_trial/stop");
-/** Gains for the present arm. */
-export const suggestGains = () => bridge.call("/study/gains", {}, LONG_CALL_MS);
-/** Offline motion of the same arm. */
-export const rollout = (args) => bridge.call("/study/rollout", args, LONG_CALL_MS);
+
+// The study's answers
+
+/** Gains for an arm. @param {import("./question.js").Question} question */
+export const suggestGains = (question) => bridge.call("/study/gains", gainsArgs(question), LONG_CALL_MS);
+/** An offline motion. @param {import("./question.js").Question} question @param {import("./question.js").Run} run */
+export const rollout = (question, run) => bridge.call("/study/rollout", rolloutArgs(question, run), LONG_CALL_MS);
+/** Limits of a loop. @param {import("./question.js").Question} question */
+export const stability = (question) => bridge.call("/study/stability", stabilityArgs(question), LONG_CALL_MS);
 
 export async function step(steps) {
   const answer = await bridge.call("/arm_sim/step", { steps });
@@ -298,24 +307,22 @@ export function sendSetpoint(positions) {
   });
 }
 
-/** The study's answer about any loop. */
-export const stability = (args) => bridge.call("/study/stability", args, LONG_CALL_MS);
-
 /** Asks about the active loop with each method, the present one first. Computing takes time, so only the newest loop counts. */
 const askNow = latestOnly(async () => {
-  const loop = question(state);
-  if (!loop) return;
-  const asked = JSON.stringify(loop);
-  const present = state.integrator?.method;
-  for (const [method] of METHODS.toSorted(([one], [other]) => Number(other === present) - Number(one === present))) {
-    const { result, values } = await stability({ ...loop, integrator: method });
-    if (JSON.stringify(question(state)) !== asked) return;
-    keepAnswer(state, asked, method, result ? values : null);
+  const present = questionOf(state);
+  if (!present) return;
+  const isPresent = (method) => Number(method === present.integrator);
+  for (const [method] of METHODS.toSorted(([one], [other]) => isPresent(other) - isPresent(one))) {
+    const asked = { ...present, integrator: method };
+    const { result, values } = await stability(asked);
+    const now = questionOf(state);
+    if (!now || loopKey(now) !== loopKey(asked)) return;
+    keepAnswer(state, asked, result ? values : null);
     tell("limits");
   }
 }, STABILITY_MS);
 
 /** Asks, unless the answer is known. */
 function askStability() {
-  if (question(state) && bridge.open && !answerInForce(state)) askNow();
+  if (questionOf(state) && bridge.open && !answerInForce(state)) askNow();
 }

@@ -28,6 +28,7 @@ export const state = {
   enabled: null, // whether the controller is on
   diagnostics: null, // { level, message, state, ...numbers }
   diverged: false,
+  broken: null, // the question at the divergence, if the page has seen it
   // The answers of /study/stability for the active loop. They have the requested loop (see `policy.js`), the values for
   // each method, and the first limit and speed of the motion since the last reset [s, rad/s].
   limits: nothingAsked(),
