@@ -49,7 +49,7 @@ function controlled(links, period, changed = {}) {
 export const STEPS = [
   {
     id: "hold", title: "A controller holds the arm",
-    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, which is called the end effector. The controller moves it to the new place.",
+    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, which is called the end effector. The controller moves it there. Arcs show the torques.",
     scene: (links) => controlled(links, 0.001),
     chart: "velocity", dial: null,
     task: { text: "Drag the end effector to a new place, and wait until it arrives.", done: ({ reached }) => reached },
@@ -64,7 +64,7 @@ export const STEPS = [
     scene: (links) => controlled(links, 0.001),
     chart: "velocity", dial: "period",
     guess: {
-      text: "At which period does it begin to shake?", answers: ["about 1 ms", "about 4 ms", "about 50 ms"], right: 1,
+      text: "At which period does it begin to shake?", answers: ["below 1 ms", "at 3 to 5 ms", "about 50 ms"], right: 1,
       because: "The red mark shows the limit. It is 4.3 ms for two links and 3 ms for three.",
     },
     task: { text: "Make the period longer until the arm shakes.", done: ({ shook }) => shook },
@@ -145,7 +145,7 @@ export const STEPS = [
   },
   {
     id: "extreme", title: "Stiff and extreme",
-    text: "Thirty-nine arms that are hard to simulate: light links, high gains, extreme numbers. Click a picture to start its scene. Some scenes need another number of links. The sentence under a picture describes the correct motion.",
+    text: "Twelve arms that are hard to simulate: light links, high gains, extreme numbers. Click a picture. Its correct motion is played slowly, and beside it a motion with a method or a timestep that fails. The live arm starts too.",
     scene: (links) => structuredClone(DEFAULTS[links]),
     chart: "pictures", dial: null,
     task: { text: "Start three of them.", done: ({ scenes }) => scenes.size >= SOME_SCENES },

@@ -5,7 +5,7 @@
 import { beginAnew, remember, setScene } from "./actions.js";
 import { Chart, drawBars, drawErrors, drawMap, drawPicture, ROOMY } from "./chart.js";
 import { followEnergy, KEPT, ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
-import { announce, byId, el, passFocus, setAddress, setAttribute, setText } from "./dom.js";
+import { announce, byId, el, goToAddress, passFocus, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
 import { duration, fixed, inPageNames, METHODS, multipleOf, partOf, seconds, shortName } from "./format.js";
 import { ENERGY, newest, record, VELOCITY } from "./history.js";
@@ -13,6 +13,7 @@ import { moveOf, rungs } from "./ladder.js";
 import { drawLadder, keyOf, presentMove } from "./ladder_panel.js";
 import { isAlone, linksIn } from "./kernel.js";
 import { latestOnly } from "./latest.js";
+import { drawMotions, FAILING, motionOf, motionsOf } from "./motions.js";
 import { controlPeriodLimit, verdict } from "./policy.js";
 import { fromRest, questionOf, stepsPerUpdate } from "./question.js";
 import { rollout, setGains, setIntegrator, setParams, setPeriod, setState, step as stepArm } from "./runtime.js";
@@ -24,6 +25,7 @@ import { state, watch, watchAll } from "./store.js";
 import { StripChart } from "./strip_chart.js";
 import { climb, climbRows, deviation } from "./study.js";
 import { Surface } from "./surface.js";
+import { connectionText } from "./transport.js";
 
 const SHAKES = 2; // rad/s: a visible speed beyond the limit
 const LOOK_MS = 500;
@@ -55,7 +57,7 @@ const CHARTS = {
   },
   map: { caption: () => "Which period is stable", draw: paintMap, ask: askMap },
   ladder: { caption: () => "Error over run time", draw: () => drawLadder(surface, now.runs) },
-  pictures: { caption: () => "Thirty-nine scenes" },
+  pictures: { caption: () => now.scene || "Twelve scenes", draw: paintMotions },
   form: { caption: () => "My arm" },
 };
 
@@ -82,6 +84,8 @@ function anew() {
     loop: /** @type {any} */ (null), // the question of the chart
     border: /** @type {import("./chart.js").Row[]} */ ([]),
     scene: "", // the sentence of the started scene
+    motions: /** @type {import("./motions.js").Motion[]} */ ([]), // of the started scene
+    played: 0, // the time since they began [ms]
     borderAsked: "", // the arm and the gains without damping of the border
   };
 }
@@ -93,19 +97,25 @@ export function startCourse() {
   byId("course-start").addEventListener("click", begin);
   byId("course-again").addEventListener("click", again);
   byId("course-steps").append(...STEPS.map((one, i) => el("button", {
-    type: "button", class: "small", "aria-label": `Step ${i + 1}: ${one.title}`, title: one.title, onclick: () => go(i),
+    type: "button", class: "small", "data-step": one.id, "aria-label": `Step ${i + 1}: ${one.title}`, title: one.title, onclick: () => go(i),
   }, String(i + 1))));
   at = Math.max(0, stepIn(location.hash));
   watch("links", open);
-  watch("connection", rest);
+  let before = "";
+  watch("connection", (connection) => {
+    // A silent server still has the scene.
+    if ([before, connection].includes("silent") && [before, connection].includes("open")) show();
+    else rest();
+    before = connection;
+  });
   watchAll(look);
   rest();
 }
 
 /** Opens the step that a new address names. */
 export function followLink() {
-  if (stepIn(location.hash) < 0) return;
-  at = stepIn(location.hash);
+  if (stepIn(location.hash) < 0 && location.hash !== "") return;
+  at = Math.max(0, stepIn(location.hash));
   open();
 }
 
@@ -116,7 +126,7 @@ function open() {
 
 /** The present step in the form of a link; empty in the workbench. */
 export function stepInLink() {
-  return state.view === "course" ? `step=${at + 1}&` : "";
+  return state.view === "course" ? `step=${STEPS[at].id}&` : "";
 }
 
 /** The number of links of the arm in this page, in the form of a link; empty if the address does not name it there. */
@@ -146,7 +156,7 @@ function rest() {
 function go(to) {
   if (to < 0 || to >= STEPS.length) return;
   at = to;
-  setAddress(`#${[`step=${at + 1}`, linksInLink()].filter(Boolean).join("&")}`);
+  goToAddress(`#${[`step=${STEPS[at].id}`, linksInLink()].filter(Boolean).join("&")}`);
   begin();
   byId("course-title").focus();
 }
@@ -228,14 +238,15 @@ function show() {
   setText(byId("course-title"), one.title);
   setText(byId("course-text"), one.text);
   const lost = state.connection !== "open";
-  setText(byId("course-status"), state.links === 0 || now.began ? "" : lost ? "The connection is lost. The page reconnects by itself." : `Press “Start” to set the arm.${isAlone ? "" : " Other viewers see the change."}`);
+  const start = `Press “Start” to set the arm.${isAlone ? "" : " Other viewers see the change."}`;
+  setText(byId("course-status"), connectionText() || (state.links === 0 || now.began ? "" : start));
   setText(byId("course-start"), now.began ? "Restart step" : "Start");
   if (lost) passFocus(byId("course-start"), byId("course-title"));
   byId("course-start").disabled = state.links === 0 || lost;
   byId("course-back").disabled = at === 0;
   byId("course-next").disabled = at === STEPS.length - 1;
   [...byId("course-steps").children].forEach((button, i) => { if (i === at) button.setAttribute("aria-current", "step"); else button.removeAttribute("aria-current"); });
-  byId("course-chart").hidden = !CHARTS[one.chart].draw;
+  byId("course-chart").hidden = !CHARTS[one.chart].draw || one.chart === "pictures";
   markOutdated(false);
   byId("course-extra").replaceChildren();
   if (state.links > 0) fillExtra(one);
@@ -267,13 +278,19 @@ const galleries = {};
 
 /** @param {number} links */
 function gallery(links) {
-  galleries[links] ??= el("div", { class: "pictures" }, ...SCENES.map((scene) => {
+  galleries[links] ??= el("div", {}, ...pictures(SCENES.filter(({ id }) => id in FAILING), links),
+    el("details", {}, el("summary", {}, "All thirty-nine scenes"), ...pictures(SCENES.filter(({ id }) => !(id in FAILING)), links)));
+  return galleries[links];
+}
+
+/** Those for the present arm come first. @param {import("./scenes.js").Scene[]} scenes @param {number} links */
+function pictures(scenes, links) {
+  return [el("div", { class: "pictures" }, ...scenes.toSorted((one, other) => Number(other.links === links) - Number(one.links === links)).map((scene) => {
     const canvas = el("canvas", { "aria-hidden": "true" });
     const { text, act } = offer(scene, links);
     new Surface(canvas, (surface) => drawPicture(surface, scene));
     return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: act === null, onclick: act }, canvas, el("span", {}, scene.name), el("small", {}, text));
-  }));
-  return galleries[links];
+  }))];
 }
 
 /**
@@ -301,10 +318,35 @@ async function runScene(scene) {
   const settings = settingsOf(scene);
   const refused = await setScene({ ...settings, controller: settings.controller ?? false }, false);
   if (mine !== now) return;
-  await setState(scene.start, scene.velocity);
+  const start = scene.watch?.start ?? scene.start;
+  await setState(start, scene.velocity);
+  now.motions = [];
+  if (!refused) showMotions(scene, mine);
   now.scene = refused ? `Refused: ${refused}` : `${scene.name}: ${scene.expected}`;
   if (!refused) now.seen.scenes.add(scene.id);
   look();
+}
+
+/** Computes the correct and the failing motion of a scene, and plays them. */
+async function showMotions(scene, mine) {
+  const { correct, failing } = motionsOf(scene);
+  const wanted = [correct, failing];
+  const answers = await Promise.all(wanted.map(({ question, run }) => rollout(question, run)));
+  if (mine !== now || !answers.every(({ result }) => result)) return;
+  mine.motions = answers.map(({ values }, k) => motionOf(wanted[k], values, k === 0, PLAYED_MS / 1e3));
+  mine.played = performance.now();
+  byId("course-chart").hidden = false;
+  surface.redraw();
+}
+
+/** The clock at which a motion is over [ms], and how often it is played. */
+const PLAYED_MS = 6000;
+const ROUNDS = 3;
+
+function paintMotions() {
+  const part = (performance.now() - now.played) / PLAYED_MS;
+  drawMotions(surface, now.motions, part < ROUNDS ? part % 1 : 1);
+  if (part < ROUNDS) requestAnimationFrame(() => { if (now.motions.length > 0) surface.redraw(); });
 }
 
 /** The clock of a step: its slider, its present value and its limit [ms]. */
@@ -354,9 +396,9 @@ function showBig() {
   setAttribute(byId("course-chart"), "aria-label", caption);
   byId("course-big").classList.toggle("good", judged === "good");
   byId("course-big").classList.toggle("bad", judged === "bad");
-  byId("course-again").hidden = !(now.ready && kind === "diverged");
+  byId("course-again").hidden = !(now.ready && kind === "diverged" && one.chart !== "pictures");
   const status = byId("course-status");
-  if (now.scene) setText(status, kind === "diverged" ? `${now.scene} This simulation diverged.` : now.scene);
+  if (now.scene) setText(status, kind === "diverged" ? `${now.scene} The live arm diverged.` : now.scene);
   else if (kind === "diverged" && one.chart !== "pictures") setText(status, DIVERGED);
   else if (status.textContent === DIVERGED) setText(status, "");
 }

@@ -8,12 +8,18 @@ import { fromRest, isFree } from "./question.js";
 
 /** @typedef {import("./question.js").Question} Question */
 
+/** The most timesteps in a series, and the shortest one of a usual control period [s]. */
+const MOST = 8;
+const SHORTEST = 1e-4;
+const LEAST = 4;
+
 /**
  * Timesteps from long to short, each half of the previous one [s]. All divide the control period, because the effective period would
  * differ otherwise, and with it the controller. A period of 0 is every step.
  */
 export function timestepsFor(period = 0) {
-  return Array.from({ length: 8 }, (_, k) => (period > 0 ? period : 0.032) / 2 ** k);
+  const all = Array.from({ length: MOST }, (_, k) => (period > 0 ? period : 0.032) / 2 ** k);
+  return all.filter((timestep, k) => timestep >= SHORTEST || k < LEAST);
 }
 
 /** @typedef {{method: string, timestep: number, error: number | null, sampling: number | null, uncertainty: number | null, wall: number, evaluations: number, divergedAt: number | null}} Rung */

@@ -7,7 +7,7 @@ import { Kernel, isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
 import { answerInForce, keepAnswer, motionHasChanged } from "./policy.js";
 import { gainsArgs, loopKey, questionOf, rolloutArgs, stabilityArgs } from "./question.js";
-import { Rosbridge } from "./rosbridge.js";
+import { Rosbridge, socketAddress } from "./rosbridge.js";
 import { MOST_LINKS, nothingAsked, set, state, tell, watch } from "./store.js";
 
 /** Other clients change settings too, and no topic reports it. */
@@ -22,6 +22,8 @@ const HIDDEN_MS = 100;
 const TOUCHED_MS = 300;
 /** Time for a computation or a search [ms]. */
 const LONG_CALL_MS = 120000;
+/** A runtime that sends nothing for this time does not answer. It sends diagnostics once a second [ms]. */
+const SILENT_MS = 3000;
 /** Many setpoints may arrive per second. The study is asked about the latest. */
 const STABILITY_MS = 200;
 /** Default radius within which a goal counts as reached [m], as in the runtime. */
@@ -37,8 +39,7 @@ let beforeChange = () => {};
 export function start(whenReset, whenChanging) {
   onReset = whenReset;
   beforeChange = whenChanging;
-  const scheme = location.protocol === "https:" ? "wss" : "ws";
-  const dial = isAlone ? () => new Kernel() : () => new WebSocket(`${scheme}://${location.host}/`);
+  const dial = isAlone ? () => new Kernel() : () => new WebSocket(socketAddress(location.href));
   bridge = new Rosbridge(dial, connection);
   bridge.onStatus = (text) => warn(inPageNames(text));
   bridge.subscribe("/joint_states", jointStates);
@@ -48,7 +49,7 @@ export function start(whenReset, whenChanging) {
   bridge.subscribe("/ik_action/result", goalResult);
   bridge.subscribe("/ik_trial/status", (msg) => set("trial", msg));
   pace();
-  setInterval(poll, POLL_MS);
+  setInterval(() => { listen(); poll(); }, POLL_MS);
   watch(["integrator", "gains", "params", "period", "enabled", "setpoint", "links"], askStability);
   watch(["params", "enabled"], () => {
     set("pushed", false);
@@ -74,8 +75,16 @@ function touch() {
   setTimeout(pace, TOUCHED_MS);
 }
 
+/** A server may keep its connection and say nothing, for example while it is stopped by a signal. */
+function listen() {
+  const isSilent = performance.now() - bridge.heard > SILENT_MS;
+  if (state.connection === "open" && isSilent) set("connection", "silent");
+  else if (state.connection === "silent" && !isSilent) set("connection", "open");
+}
+
 function connection(now) {
   const before = state.connection;
+  state.failures = bridge?.failures ?? 0;
   set("connection", now);
   if (now === "open") {
     // It may be another or a restarted runtime, so all old values are discarded.

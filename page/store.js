@@ -9,7 +9,8 @@ export function nothingAsked() {
 }
 
 export const state = {
-  connection: "connecting", // or "open", "lost"
+  connection: "connecting", // or "open", "lost"; "silent" without a message for some seconds
+  failures: 0, // attempts in a row without a connection
   links: 0, // 0 until the runtime has sent it
   // The latest joint state. Written in place 60 times a second; `version` counts them.
   version: 0,
