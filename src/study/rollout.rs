@@ -334,7 +334,7 @@ impl<const N: usize> Reference<N> {
             arm: neighbour(&control.arm, index),
             taylor: TaylorReference::new(start).cut(if index == 1 { 2 } else { 1 }),
             pid: control.simulation(start).pid().clone(),
-            hold: Hold::new(held, control.timestep),
+            hold: Hold::new(held, control.limits, control.timestep),
             timestep: control.timestep,
             is_lost: false,
         }
