@@ -13,7 +13,7 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::{ControlPeriod, Simulation as Loop};
 use pyo3::IntoPyObject;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyclass, pymethods};
-use pyo3::types::{PyDict, PyMappingProxy};
+use pyo3::types::PyDict;
 
 use crate::arm::{Arm, Chain, Either, Given, for_either, or_default};
 use crate::arrays::{joints, joints_or, property};
@@ -279,9 +279,10 @@ impl Simulation {
         })
     }
 
-    /// The present gains by name, in a read-only mapping. `set_gains` changes them.
+    /// The present gains by name, in a read-only mapping, which can be copied, pickled and handed in. `set_gains`
+    /// changes them.
     #[getter]
-    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyMappingProxy>> {
+    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Object<'py>> {
         let found = PyDict::new(py);
         for_either!(&self.own, one => {
             let one = hold(py, one);
@@ -290,7 +291,8 @@ impl Simulation {
                 found.set_item(name, property(py, gain)?)?;
             }
         });
-        Ok(PyMappingProxy::new(py, found.as_mapping()))
+        py.import("pendularm._fields")?
+            .call_method1("Gains", (found,))
     }
 
     /// Whether the controller is on.

@@ -226,6 +226,25 @@ def test_actions_have_a_row_for_each_arm(actions):
         one.step(actions)
 
 
+def test_booleans_are_not_actions():
+    env, one = pendularm.envs.PendularmVectorEnv(3), pendularm.envs.PendularmEnv()
+    env.reset(seed=0)
+    one.reset(seed=0)
+    with pytest.raises(ValueError, match=r"^actions must have the shape \(3, 2\), of numbers, got \(3, 2\) of bool"):
+        env.step(np.ones((3, 2), bool))
+    with pytest.raises(ValueError, match=r"^action must have the shape \(2,\), of numbers, got \(2,\) of bool"):
+        one.step(np.ones(2, bool))
+
+
+@pytest.mark.parametrize("kind", [pendularm.envs.PendularmEnv, pendularm.envs.PendularmReachVectorEnv])
+def test_a_refused_environment_can_be_closed(kind):
+    # Gymnasium 1.1 and 1.2 close it when it is collected.
+    env = kind.__new__(kind)
+    with pytest.raises(ValueError, match="^links must be 2 or 3, got 4"):
+        env.__init__(links=4)
+    env.close()
+
+
 @pytest.mark.parametrize("given", [[[1, 1], [1, 2, 3]], range(2**62)])
 def test_what_is_no_array_is_refused_by_its_name(given):
     env, one = pendularm.envs.PendularmVectorEnv(3), pendularm.envs.PendularmEnv()

@@ -6,10 +6,14 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .study import SuggestedGains
+
 __all__ = [
+    "BUILD",
     "Arm",
     "Batch",
     "Divergence",
+    "PromisedFloats",
     "Simulation",
     "as_doubles",
     "coriolis",
@@ -31,6 +35,8 @@ __all__ = [
 ]
 
 _Floats = NDArray[np.float64]
+
+BUILD: str
 
 @final
 class Arm:
@@ -77,7 +83,7 @@ class Simulation:
         *,
         method: str = "rk4",
         timestep: float = 0.001,
-        gains: Mapping[str, ArrayLike | None] | None = None,
+        gains: Mapping[str, ArrayLike | None] | SuggestedGains | None = None,
         control_period: float = 0.0,
         control_delay: bool | np.bool_ = False,
     ) -> Simulation: ...
@@ -170,6 +176,12 @@ class Batch:
     @property
     def end_effector(self) -> _Floats: ...
     def __len__(self) -> int: ...
+
+@final
+class PromisedFloats:
+    def __new__(cls) -> PromisedFloats: ...
+    def __enter__(self) -> None: ...
+    def __exit__(self, _kind: object, _error: object, _trace: object) -> None: ...
 
 def as_doubles(value: Any) -> _Floats: ...
 def is_masked(value: Any) -> bool: ...

@@ -20,7 +20,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ._fields import Floats, as_array, read_seeds, shown, whole_number
+from ._fields import Floats, as_array, promised, read_seeds, shown, whole_number
 from ._native import is_masked
 from ._render import METADATA, Frame, Renderer
 from ._tasks import TIMESTEP, Action, Observation, Reach, SwingUp, Task
@@ -38,7 +38,7 @@ def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
     if is_masked(actions):
         raise ValueError(f"{name} must have no masked numbers, got {shown(actions)}")
     array = as_array(name, actions)
-    if array.shape != space.shape or array.dtype.kind not in "biuf":
+    if array.shape != space.shape or array.dtype.kind not in "iuf":
         raise ValueError(f"{name} must have the shape {space.shape}, of numbers, got {array.shape} of {array.dtype}")
     return array
 
@@ -57,6 +57,7 @@ class _Single(gymnasium.Env[Observation, Action]):
     metadata: dict[str, Any] = METADATA  # noqa: RUF012
     task_of: ClassVar[type[Task]]
 
+    @promised
     def __init__(
         self,
         links: int = 2,
@@ -71,6 +72,7 @@ class _Single(gymnasium.Env[Observation, Action]):
         self.observation_space = self._task.observation_space
         self.action_space = self._task.action_space
 
+    @promised
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -80,6 +82,7 @@ class _Single(gymnasium.Env[Observation, Action]):
         self._picture.update(np.ones(1, np.bool_))
         return self._task.observe()[0], {}
 
+    @promised
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         _need_reset("step", self._has_begun)
         action = _checked("action", action, self.action_space)
@@ -97,13 +100,16 @@ class _Single(gymnasium.Env[Observation, Action]):
 
     def close(self) -> None:
         self._has_begun = False
-        self._picture.close()
+        # Gymnasium 1.1 and 1.2 close also an environment whose arguments were refused.
+        if hasattr(self, "_picture"):
+            self._picture.close()
 
 
 class _Vector(VectorEnv[Observation, Action, Any]):
     metadata: dict[str, Any] = {**METADATA, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
     task_of: ClassVar[type[Task]]
 
+    @promised
     def __init__(
         self,
         num_envs: int = 1,
@@ -153,6 +159,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             self._streams = [seeding.np_random() for _ in range(self.num_envs)]
         return self._streams
 
+    @promised
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -181,6 +188,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self._picture.update(mask)
         return self._task.observe(), {}
 
+    @promised
     def step(
         self, actions: Action
     ) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
@@ -210,7 +218,9 @@ class _Vector(VectorEnv[Observation, Action, Any]):
 
     def close_extras(self, **kwargs: Any) -> None:
         self._has_begun = False
-        self._picture.close()
+        # Gymnasium 1.1 and 1.2 close also an environment whose arguments were refused.
+        if hasattr(self, "_picture"):
+            self._picture.close()
 
     def _begin(self, mask: NDArray[np.bool_]) -> None:
         arms = np.flatnonzero(mask).tolist()

@@ -43,7 +43,7 @@ const MOST_THREADS: usize = 1024;
 ///
 /// All start as in a fresh runtime. `position`, `velocity`, `effort`, `time` and `diverged` are read-only arrays,
 /// created once and overwritten by every call that changes the arms. Copy values that you need later. An array
-/// argument has one row per arm, (`n_arms`, links), or one for all, (links,). Contiguous, writable doubles are read
+/// argument has one row per arm, (`n_arms`, links), or one for all, (links,) or (1, links). Contiguous, writable doubles are read
 /// without a copy. `threads` share the work: by default one per core, or fewer if the system refuses some. With 1 the
 /// caller's thread does the work. Calls that change one batch from several threads wait for each other. The arrays
 /// can be read meanwhile, and show the present state of each arm. A batch cannot be copied or pickled. A
