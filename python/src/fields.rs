@@ -37,7 +37,8 @@ impl Bound {
         }
     }
 
-    fn admits(self, value: f64) -> bool {
+    /// Whether the number is valid.
+    pub(crate) fn admits(self, value: f64) -> bool {
         value.is_finite()
             && match self {
                 Self::Finite => true,

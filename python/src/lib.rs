@@ -15,6 +15,7 @@ mod floats;
 mod gains;
 mod patience;
 mod simulation;
+mod state;
 mod study;
 
 /// The compiled part of the package `pendularm`.
