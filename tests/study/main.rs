@@ -23,6 +23,7 @@ mod fewest;
 #[path = "../support/folder.rs"]
 mod folder;
 mod friction;
+mod held_loop;
 mod matrix;
 mod motion;
 mod planner;
