@@ -5,7 +5,7 @@
 import { significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
 import { Pencil } from "./pencil.js";
-import { LogScale, powerOfTen } from "./scale.js";
+import { Axis, LogScale, powerOfTen, times } from "./scale.js";
 import { colors } from "./theme.js";
 
 /** @typedef {import("./scale.js").Scale} Scale */
@@ -277,4 +277,24 @@ export function drawPicture({ context, width, height }, { start, settings }) {
   context.lineCap = "round";
   masses.forEach((mass, i) => line(context, px(x[i]), py(y[i]), px(x[i + 1]), py(y[i + 1]), colors.joints[i], Math.min(9, Math.max(1.5, 4 + 0.8 * Math.log10(Math.max(1e-9, mass))))));
   circle(context, width / 2, height / 2, 3, colors.muted);
+}
+
+const RESPONSE = new Axis(4, 0.5, 20);
+
+/**
+ * Responses over each other, each with its name, and the present one.
+ * @param {Surface} surface @param {{name: string, points: number[][]}[]} responses @param {number[][]} points @param {number} setpoint
+ * @param {number} lasts [s]
+ */
+export function drawResponses(surface, responses, points, setpoint, lasts) {
+  const all = [...responses.map((one) => one.points), points].flat().map(([, q]) => q);
+  RESPONSE.fit(Math.min(setpoint, ...all), Math.max(setpoint + 0.1, ...all));
+  const chart = new Chart(surface, times(0, lasts), RESPONSE, ROOMY);
+  chart.frame({ across: "time since the start [s]", up: "joint 1 [rad]" });
+  chart.inside(() => {
+    chart.path([[0, setpoint], [lasts, setpoint]], colors.muted, { width: 1, dash: DASHED });
+    responses.forEach(({ points: old }, k) => chart.path(old, colors.methods[k], { width: 1.5 }));
+    chart.path(points, colors.ink, { width: 2.5 });
+  });
+  responses.forEach(({ name }, k) => chart.words(name, chart.right - 6, chart.bottom - 12 - 17 * (responses.length - 1 - k), "right", colors.methods[k]));
 }

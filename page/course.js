@@ -1,4 +1,4 @@
-// The course: ten steps, each a scene, a chart, a task that ticks itself, and a question with its answer.
+// The course: eleven steps, each a scene, a chart, a task that ticks itself, and a question with its answer.
 // Invariant: a step is data. Its text has at most 40 words. Its view sets the scene on a click only.
 
 import { DEFAULTS } from "./settings.js";
@@ -14,8 +14,8 @@ import { DEFAULTS } from "./settings.js";
  * @property {(links: number) => Settings} scene
  * @property {number[]} [offset] pose at the start [rad], else stretched out
  * @property {boolean} [paused] whether the arm takes two control steps a second
- * @property {"velocity" | "bars" | "errors" | "map" | "energy" | "ladder" | "pictures" | "form"} chart
- * @property {"period" | "timestep" | "damping" | null} dial
+ * @property {"velocity" | "bars" | "errors" | "map" | "responses" | "energy" | "ladder" | "pictures" | "form"} chart
+ * @property {"period" | "timestep" | "damping" | "gains" | null} dial
  * @property {boolean} [methods] whether the methods can be chosen
  * @property {Question} [guess] before the dial is shown
  * @property {{text: string, done: (seen: Seen) => boolean}} task
@@ -28,6 +28,13 @@ export const BEYOND = { 2: 0.0055, 3: 0.0038 };
 const WITHIN = { 2: 0.004, 3: 0.002 };
 /** Short enough that the simulation's error is not visible [s]. */
 const FINE = 0.0001;
+/** Gains that are soft enough for a visible response, with some integral. @type {Record<number, import("./settings.js").Gains>} */
+export const SOFT = {
+  2: { kp: [200, 100], ki: [60, 30], kd: [60, 20] },
+  3: { kp: [400, 100, 40], ki: [120, 30, 12], kd: [120, 30, 6] },
+};
+/** Effort limits of that step: little more than the weight needs [N m]. @type {Record<number, number[]>} */
+export const WEAK = { 2: [30, 10], 3: [60, 25, 8] };
 /** Four methods. */
 const ALL = 4;
 /** The required reduction of the method's error. */
@@ -71,6 +78,22 @@ export const STEPS = [
     question: {
       text: "Just below the limit, what does the arm do?", answers: ["It shakes a little", "It comes to rest", "It falls"], right: 1,
       because: "Below the limit small deviations die away. Just beyond the limit some of them grow.",
+    },
+  },
+  {
+    id: "pid", title: "Three gains, and windup",
+    text: "The torque is kp times the error, plus ki times its sum over time, plus kd times the error of the speed. The arm hangs and must come up. Each change starts the move again.",
+    scene: (links) => controlled(links, 0.001, { integrator: { method: "rk4", timestep: 0.001 }, gains: SOFT[links] }),
+    offset: [-Math.PI / 2, 0, 0],
+    chart: "responses", dial: "gains",
+    task: {
+      text: "Show a sag without ki, an overshoot by too much ki, windup at 30 N m, and its cure.",
+      done: ({ responses: { sag, overshoot, windup, cure } }) => sag && overshoot && windup && cure,
+    },
+    question: {
+      text: "Why does the arm overshoot with the limit?",
+      answers: ["The integral grew while the motor could not give more", "The motor is too strong", "The timestep is too long"], right: 0,
+      because: "At its limit the motor cannot follow. The error stays, and the sum of it grows: windup. It falls only beyond the setpoint. A cure stops the sum meanwhile.",
     },
   },
   {
@@ -179,6 +202,7 @@ export function nothingSeen() {
     measured: false, // whether the ladder is complete
     scenes: /** @type {Set<string>} */ (new Set()), // started scenes
     energy: { of: "", timestep: 0, since: Infinity, until: 0, low: 0, high: 0 }, // of the free swing; see `followEnergy`
+    responses: { sag: false, overshoot: false, windup: false, cure: false }, // what they have shown
     sheet: false, // whether a sheet was made
   };
 }
@@ -192,6 +216,11 @@ export function followEnergy({ of: before, since, until, low, high }, of, timest
   return of === before && time >= until
     ? { of, timestep, since, until: time, low: Math.min(low, total), high: Math.max(high, total) }
     : { of, timestep, since: time, until: time, low: total, high: total };
+}
+
+/** The ids of steps in a text, such as the ticks that the browser keeps or a link carries. @param {string | null} text @returns {string[]} */
+export function stepsIn(text) {
+  return (text ?? "").split(",").filter((id) => STEPS.some((one) => one.id === id));
 }
 
 /** Whether a deviation decays: its last bars compared with its first ones. @param {number[]} bars */
@@ -209,11 +238,11 @@ export function ofLimit(time, limit) {
   return limit === 0 ? `${short(time)} ms, none known as stable` : `${short(time)} of ${short(limit)} ms`;
 }
 
+/** The steps by the numbers of older links. */
+const NUMBERED = ["hold", "slow", "look", "method", "timestep", "limit", "energy", "price", "extreme", "own"];
+
 /** The step that a link names, from 0; -1 if it names none. @param {string} hash */
 export function stepIn(hash) {
   const named = new URLSearchParams(hash.replace(/^#/, "")).get("step") ?? "";
-  const byName = STEPS.findIndex(({ id }) => id === named);
-  if (byName >= 0) return byName;
-  const number = Number(named);
-  return Number.isInteger(number) && number >= 1 && number <= STEPS.length ? number - 1 : -1;
+  return STEPS.findIndex(({ id }) => id === (NUMBERED[Number(named) - 1] ?? named));
 }

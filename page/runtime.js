@@ -220,6 +220,7 @@ function poll() {
   setIntegrator({});
   setGains({});
   setPeriod({});
+  setMotors({});
   pause();
   enable();
   askStability();
@@ -248,6 +249,7 @@ export const setParams = (args) => settings("/arm_sim/set_params", args, (values
 export const setIntegrator = (args) => settings("/arm_sim/set_integrator", args, (values) => keep("integrator", values));
 export const setGains = (args) => settings("/pid_controller/set_gains", args, (values) => keep("gains", values));
 export const setPeriod = (args) => settings("/pid_controller/set_period", args, (values) => keep("period", values));
+export const setMotors = (args) => settings("/pid_controller/set_limits", args, (values) => keep("motors", values));
 export const enable = (data) => settings("/pid_controller/enable", data === undefined ? {} : { data }, (values) => keep("enabled", values.data));
 export const disturb = (effort, seconds) => bridge.call("/arm_sim/disturb", { effort, duration: seconds });
 export const solve = (target) => bridge.call("/ik/solve", target);

@@ -6,7 +6,7 @@ import time
 from stage import IS_FILE, PageTest
 from test_layout import CLIPPED, PHONE, audit, forget_the_inspectors
 
-STEPS = ("hold", "slow", "look", "method", "timestep", "limit", "energy", "price", "extreme", "own")
+STEPS = ("hold", "slow", "pid", "look", "method", "timestep", "limit", "energy", "price", "extreme", "own")
 DIAL = "#course-dial input[type=number]"
 
 
@@ -148,6 +148,37 @@ class Tasks(CourseTest):
         self.wait(lambda: self.page.run(look)[0] < 0.01 and abs(self.page.run(look)[1] - 0.02) < 0.005, "from the offset")
         self.wait(lambda: self.page.run(look)[0] > 0.01, "and on")
 
+    def test_three_gains_show_a_sag_an_overshoot_windup_and_its_cure(self):
+        def response(*act):
+            """What the next whole response has shown."""
+                act[0](*act[1:])
+            self.page.until("own('store.js').then(({ state }) => state.time < 3)", why="a change starts the move again")
+            self.page.until("document.querySelector('#course-what').textContent.startsWith('overshoot;')", why="a whole response")
+            return self.page.text("#course-status")
+
+        def gain(place, value):
+            self.page.fill(f"#course-dial .field:nth-child({place}) input[type=number]", value)
+
+        def motors(anti_windup):
+            self.page.click(f"#course-extra [data-motors*={anti_windup}]")
+
+        self.step("pid")
+        self.assertIn("Shown: sag", response(gain, 2, "0"))
+        self.assertIn("overshoot", response(gain, 2, "900"))
+        response(gain, 2, "60")
+        self.assertIn("windup", response(motors, "none"))
+        self.assertEqual(self.values("/pid_controller/set_limits")["effort"], [30, 10])
+        self.assertNotEqual(self.page.run("document.querySelector('#course-task').className"), "done")
+        response(motors, "conditional")
+        self.done("a cure")
+        self.keep("pid")
+        self.assertTrue(self.page.run("document.querySelector('#course-steps [data-step=pid]').classList.contains('done')"), "a tick at the number")
+        self.assertIn("done=pid&", self.page.run("own('views.js').then((share) => share.address())"))
+        self.step("method")
+        self.assertEqual(self.values("/pid_controller/set_limits")["effort"], None, "the next scene has no limit")
+        page = self.open("#step=own&done=hold,nonsense")
+        page.until("[...document.querySelectorAll('#course-steps .done')].map((one) => one.dataset.step).join() === 'hold,pid'", why="kept, and carried by a link")
+
     def test_the_browsers_back_leads_to_the_step_before(self):
         self.step("slow")
         self.step("look")
@@ -203,7 +234,7 @@ class Tasks(CourseTest):
         self.page.run("window.old = 1")
         self.page.click("#scene-S01")
         self.page.until("window.old === undefined && document.querySelector('#links')?.value === '3'", why="another arm")
-        self.page.until("document.querySelector('#course-number').textContent === 'Step 9 of 10' && !document.querySelector('#scene-S01').disabled")
+        self.page.until("document.querySelector('#course-number').textContent === 'Step 10 of 11' && !document.querySelector('#scene-S01').disabled")
 
     def test_the_sheet_agrees_with_the_study_and_does_not_change_the_arm(self):
         self.step("own")
@@ -235,7 +266,7 @@ class Tasks(CourseTest):
         self.page.until("document.querySelectorAll('#kp-fields input[type=number]').length === 3" if IS_FILE else "document.querySelector('#offer .refusal').textContent.startsWith('Needs 3 links')")
         self.page.run("location.hash = '#step=6'")
         self.page.until("document.querySelector('#course-title').checkVisibility() && !document.querySelector('#offer').checkVisibility()")
-        self.assertEqual(self.page.text("#course-number"), "Step 6 of 10")
+        self.assertEqual(self.page.text("#course-number"), "Step 7 of 11")
 
     def press(self, selector):
         self.page.run(f"document.querySelector('{selector}').focus()")

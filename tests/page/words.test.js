@@ -1,6 +1,7 @@
 // Numbers as text, scales, settings in links, and the inverse of each.
 
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
 import { duration, fixed, inPageNames, multipleOf, partOf, plain, short, significant } from "../../page/format.js";
@@ -136,4 +137,17 @@ test("a request with a number that is not finite is refused, because null can me
   assert.equal(sent.length, 1, "the runtime names the entries of a list");
   bridge.answer("page-1", { result: true });
   assert.ok((await call).result);
+});
+
+test("each link of the worksheets sets everything", () => {
+  const text = readFileSync(new URL("../../course/worksheets.md", import.meta.url), "utf8");
+  const links = [...text.matchAll(/\(\.\.\/pendularm\.html(#[^)]*)\)/g)].map(([, hash]) => hash);
+  assert.equal(links.length, 6);
+  for (const link of links) {
+    const settings = fromFragment(link);
+    for (const [key, wanted] of Object.entries(DEFAULTS[2])) {
+      assert.deepEqual(Object.keys(settings[key] ?? {}).sort(), Object.keys(wanted ?? {}).sort(), `${key} in ${link}`);
+    }
+    assert.deepEqual([settings.start.position.length, settings.start.velocity.length], [2, 2]);
+  }
 });
