@@ -7,7 +7,7 @@ import { METHODS, seconds, shortName } from "./format.js";
 import { limitLabel } from "./stability_panel.js";
 import { controlPeriodLimit, limitInForce, periodText } from "./policy.js";
 import { questionOf } from "./question.js";
-import { enable, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, suggestGains } from "./runtime.js";
+import { enable, sendSetpoint, setGains, setIntegrator, setMotors, setParams, setPeriod, suggestGains } from "./runtime.js";
 import { LOOP, set, state, watch } from "./store.js";
 
 const PLACES = [["Earth", 9.81], ["Moon", 1.62], ["Mars", 3.72], ["Jupiter", 24.79], ["none", 0]];
@@ -32,7 +32,7 @@ export function startControls() {
   suggestSaid = refusal(suggestButton);
   byId("suggest").append(suggestButton, suggestSaid.element);
   watch("links", makeJointFields);
-  watch(["params", "gains", "setpoint"], showStored);
+  watch(["params", "gains", "motors", "setpoint"], showStored);
   watch("joint", (joint) => { for (const [i, radio] of radios("joint").entries()) radio.checked = i === joint; });
 }
 
@@ -138,6 +138,9 @@ function makeJointFields(links) {
   gain("kp", "N m/rad", 20000, "proportional gain");
   gain("ki", "N m/(rad s)", 50000, "integral gain");
   gain("kd", "N m s/rad", 1000, "derivative gain");
+  fill("limit-fields", links, {
+    unit: "N m", low: 1, high: 1000, log: true, name: "effort limit", stored: () => state.motors?.effort ?? undefined, send: (effort) => setMotors({ effort }),
+  });
   fill("setpoint-fields", links, { unit: "rad", low: -Math.PI, high: Math.PI, name: "setpoint", stored: () => (state.setpointKnown ? Array.from(state.setpoint.subarray(0, links)) : undefined), values: presentSetpoint, send: async (positions) => place(positions) });
   byId("joint-choice").replaceChildren(...Array.from({ length: links }, (_, joint) => el("label", { class: `segment joint${joint + 1}`, title: `Joint ${joint + 1} (key j for the next)` },
     el("input", { type: "radio", name: "joint", onchange: () => chooseJoint(joint) }), el("span", {}, `${joint + 1}`))));
