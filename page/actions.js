@@ -71,7 +71,8 @@ export async function apply(/** @type {import("./settings.js").Settings} */ { in
 /** Sends the setpoint if the runtime will accept it. A message has no answer, so the refusal has the words of the services. @param {number[]} setpoint */
 function setSetpoint(setpoint) {
   const wrong = setpoint.findIndex((angle) => !Number.isFinite(angle));
-  const status = setpoint.length !== state.links ? `setpoint must have ${state.links} entries, got ${setpoint.length}` : wrong >= 0 ? `setpoint[${wrong}] must be a number` : "";
+  const status = setpoint.length !== state.links ? `setpoint must have ${state.links} entries, got ${setpoint.length}` : wrong >= 0
+    ? `setpoint[${wrong}] must be a number` : "";
   if (!status) sendSetpoint(setpoint);
   return { result: !status, status };
 }
@@ -81,7 +82,10 @@ function textOf(answers) {
   return inPageNames(answers.filter((answer) => !answer.result).map((answer) => answer.status ?? "").join("; "));
 }
 
-/** Sets all settings, from the starting pose, then running or paused. Returns the text of all refusals. @param {import("./settings.js").Settings} settings @param {boolean} paused */
+/**
+ * Sets all settings, from the starting pose, then running or paused. Returns the text of all refusals. @param
+ * {import("./settings.js").Settings} settings @param {boolean} paused
+ */
 export async function setScene({ controller, setpoint, ...rest }, paused) {
   await enable(false);
   const early = await apply({ ...rest, controller: null, setpoint: null });

@@ -68,7 +68,8 @@ function startClocks() {
 function startGravity() {
   const gravity = numberField({ label: "gravity", unit: "m/s²", low: 0, high: 30, commit: (value) => setParams({ gravity: value }) });
   byId("gravity-field").append(gravity.element);
-  byId("gravity-places").append(...PLACES.map(([name, value]) => el("button", { type: "button", class: "small", onclick: () => gravity.report(setParams({ gravity: value })) }, name)));
+  byId("gravity-places").append(...PLACES.map(([name, value]) => el("button",
+    { type: "button", class: "small", onclick: () => gravity.report(setParams({ gravity: value })) }, name)));
   watch("params", (params) => gravity.accept(params.gravity));
 }
 
@@ -132,7 +133,8 @@ export function chooseJoint(joint) {
 function makeJointFields(links) {
   perJoint = [];
   const of = (group, key, send) => ({ stored: () => state[group]?.[key], send: (values) => send({ [key]: values }) });
-  const gain = (key, unit, high, name) => fill(`${key}-fields`, links, { unit, low: high / 1e4, high, log: true, zero: true, name, ...of("gains", key, setGains) });
+  const gain = (key, unit, high, name) => fill(`${key}-fields`, links,
+    { unit, low: high / 1e4, high, log: true, zero: true, name, ...of("gains", key, setGains) });
   fill("masses-fields", links, { unit: "kg", low: 0.05, high: 20, log: true, name: "mass", ...of("params", "masses", setParams) });
   fill("lengths-fields", links, { unit: "m", low: 0.1, high: 3, log: true, name: "length", ...of("params", "lengths", setParams) });
   gain("kp", "N m/rad", 20000, "proportional gain");
@@ -141,8 +143,12 @@ function makeJointFields(links) {
   fill("limit-fields", links, {
     unit: "N m", low: 1, high: 1000, log: true, name: "effort limit", stored: () => state.motors?.effort ?? undefined, send: (effort) => setMotors({ effort }),
   });
-  fill("setpoint-fields", links, { unit: "rad", low: -Math.PI, high: Math.PI, name: "setpoint", stored: () => (state.setpointKnown ? Array.from(state.setpoint.subarray(0, links)) : undefined), values: presentSetpoint, send: async (positions) => place(positions) });
-  byId("joint-choice").replaceChildren(...Array.from({ length: links }, (_, joint) => el("label", { class: `segment joint${joint + 1}`, title: `Joint ${joint + 1} (key j for the next)` },
+  fill("setpoint-fields", links, { unit: "rad", low: -Math.PI, high: Math.PI, name: "setpoint",
+    stored: () => (state.setpointKnown ? Array.from(state.setpoint.subarray(0, links)) : undefined), values: presentSetpoint,
+    send: async (positions) => place(positions),
+  });
+  byId("joint-choice").replaceChildren(...Array.from({ length: links },
+    (_, joint) => el("label", { class: `segment joint${joint + 1}`, title: `Joint ${joint + 1} (key j for the next)` },
     el("input", { type: "radio", name: "joint", onchange: () => chooseJoint(joint) }), el("span", {}, `${joint + 1}`))));
   set("joint", state.joint < links ? state.joint : 0);
   showStored();

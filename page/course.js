@@ -56,12 +56,14 @@ function controlled(links, period, changed = {}) {
 export const STEPS = [
   {
     id: "hold", title: "A controller holds the arm",
-    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, which is called the end effector. The controller moves it there. Arcs show the torques.",
+    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, which is called the end "
+      + "effector. The controller moves it there. Arcs show the torques.",
     scene: (links) => controlled(links, 0.001),
     chart: "velocity", dial: null,
     task: { text: "Drag the end effector to a new place, and wait until it arrives.", done: ({ reached }) => reached },
     question: {
-      text: "What does the controller do between two measurements?", answers: ["It holds the torques as they are", "It corrects them all the time", "It sets them to zero"], right: 0,
+      text: "What does the controller do between two measurements?",
+        answers: ["It holds the torques as they are", "It corrects them all the time", "It sets them to zero"], right: 0,
       because: "A computer measures only at certain times. Between two measurements it holds each torque. This is called a hold.",
     },
   },
@@ -82,7 +84,8 @@ export const STEPS = [
   },
   {
     id: "pid", title: "Three gains, and windup",
-    text: "The torque is kp times the error, plus ki times its sum over time, plus kd times the error of the speed. The arm hangs and must come up. Each change starts the move again.",
+    text: "The torque is kp times the error, plus ki times its sum over time, plus kd times the error of the speed. The arm hangs and must come "
+      + "up. Each change starts the move again.",
     scene: (links) => controlled(links, 0.001, { integrator: { method: "rk4", timestep: 0.001 }, gains: SOFT[links] }),
     offset: [-Math.PI / 2, 0, 0],
     chart: "responses", dial: "gains",
@@ -93,35 +96,41 @@ export const STEPS = [
     question: {
       text: "Why does the arm overshoot with the limit?",
       answers: ["The integral grew while the motor could not give more", "The motor is too strong", "The timestep is too long"], right: 0,
-      because: "At its limit the motor cannot follow. The error stays, and the sum of it grows: windup. It falls only beyond the setpoint. A cure stops the sum meanwhile.",
+      because: "At its limit the motor cannot follow. The error stays, and the sum of it grows: windup. It falls only beyond the setpoint. A "
+        + "cure stops the sum meanwhile.",
     },
   },
   {
     id: "look", title: "Look closely",
-    text: "Each bar is the speed of the last joint at one measurement, computed without gravity after a tiny push. The arm itself starts beside the pose that the controller holds. It moves in slow motion: two measurements a second.",
+    text: "Each bar is the speed of the last joint at one measurement, computed without gravity after a tiny push. The arm itself starts beside "
+      + "the pose that the controller holds. It moves in slow motion: two measurements a second.",
     scene: (links) => controlled(links, BEYOND[links]),
     offset: [0, 0.02, 0], paused: true,
     chart: "bars", dial: "period",
     task: { text: "Shorten the period until the bars shrink.", done: ({ shrinks, stable }) => shrinks && stable },
     question: {
-      text: "At the first period the last bars pointed up and down in turn. Why?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
+      text: "At the first period the last bars pointed up and down in turn. Why?",
+        answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
       because: "The torque is held too long. It pushes the joint past the target. At the first period the pushes grew.",
     },
   },
   {
     id: "method", title: "A better method?",
-    text: "The method computes the motion between two measurements. Runge–Kutta 4 is far more exact than Euler. Try all four: does the limit of the period move?",
+    text: "The method computes the motion between two measurements. Runge–Kutta 4 is far more exact than Euler. Try all four: does the limit of "
+      + "the period move?",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "velocity", dial: "period", methods: true,
     task: { text: "Try all four methods at this period.", done: ({ methods }) => methods.size === ALL },
     question: {
-      text: "Why does a better method not help?", answers: ["The controller still measures as rarely", "Euler is exact enough", "The controller is too weak"], right: 0,
+      text: "Why does a better method not help?",
+      answers: ["The controller still measures as rarely", "Euler is exact enough", "The controller is too weak"], right: 0,
       because: "This limit comes from the hold between two measurements. A real robot has no method, but such a limit too.",
     },
   },
   {
     id: "timestep", title: "A finer timestep?",
-    text: "The simulation has its own clock, the timestep. A shorter one makes the computed motion more exact. The method and the control period stay the same. They are named above the chart.",
+    text: "The simulation has its own clock, the timestep. A shorter one makes the computed motion more exact. The method and the control period "
+      + "stay the same. They are named above the chart.",
     scene: (links) => controlled(links, WITHIN[links], { integrator: { method: "midpoint", timestep: WITHIN[links] } }),
     chart: "errors", dial: "timestep",
     task: { text: "Make the error of the method 100 times smaller.", done: ({ gain }) => gain >= MUCH },
@@ -132,7 +141,8 @@ export const STEPS = [
   },
   {
     id: "limit", title: "What sets the limit",
-    text: "More damping or less mass means that a held torque changes the speed faster. The controller must measure more often. The limit is about T = 2 λmin(Kd⁻¹ M), with mass matrix M, damping Kd, smallest eigenvalue λmin.",
+    text: "More damping or less mass means that a held torque changes the speed faster. The controller must measure more often. The limit is "
+      + "about T = 2 λmin(Kd⁻¹ M), with mass matrix M, damping Kd, smallest eigenvalue λmin.",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "map", dial: "damping",
     task: { text: "Change damping and mass until this period is stable.", done: ({ stable }) => stable },
@@ -143,7 +153,8 @@ export const STEPS = [
   },
   {
     id: "energy", title: "Without a controller",
-    text: "Nothing drives this swing, so its energy should stay constant. Euler at 5 ms makes it grow. Each choice starts a new swing. Some methods gain energy, others lose it, also where no motion looks wrong.",
+    text: "Nothing drives this swing, so its energy should stay constant. Euler at 5 ms makes it grow. Each choice starts a new swing. Some "
+      + "methods gain energy, others lose it, also where no motion looks wrong.",
     scene: (links) => ({ ...structuredClone(DEFAULTS[links]), integrator: { method: "euler", timestep: 0.005 }, controller: false }),
     chart: "energy", dial: "timestep", methods: true,
     task: {
@@ -151,13 +162,16 @@ export const STEPS = [
       done: ({ energy }) => energy.timestep === STRIDE && energy.since < FIRST && energy.until >= LONG && energy.low >= -KEPT && energy.high <= KEPT,
     },
     question: {
-      text: "Can Euler keep the energy with a shorter step?", answers: ["Yes, below 1 ms", "No, the energy only grows more slowly", "Yes, below 0.1 ms"], right: 1,
-      because: "Without damping, Euler makes even a small swing wider, however short the step is. The other methods change it too, but far less: this Verlet guesses a velocity, so it is not symplectic.",
+      text: "Can Euler keep the energy with a shorter step?",
+        answers: ["Yes, below 1 ms", "No, the energy only grows more slowly", "Yes, below 0.1 ms"], right: 1,
+      because: "Without damping, Euler makes even a small swing wider, however short the step is. The other methods change it too, but far less: "
+        + "this Verlet guesses a velocity, so it is not symplectic.",
     },
   },
   {
     id: "price", title: "The price of accuracy",
-    text: "Each dot is one run, with its error and its run time. Solid lines show the error of the method. Dashed lines show the distance from a controller without a hold. A cross marks a run that diverged.",
+    text: "Each dot is one run, with its error and its run time. Solid lines show the error of the method. Dashed lines show the distance from a "
+      + "controller without a hold. A cross marks a run that diverged.",
     scene: (links) => controlled(links, WITHIN[links]),
     chart: "ladder", dial: null,
     task: { text: "Measure the four methods.", done: ({ measured }) => measured },
@@ -168,7 +182,8 @@ export const STEPS = [
   },
   {
     id: "extreme", title: "Stiff and extreme",
-    text: "Twelve arms that are hard to simulate: light links, high gains, extreme numbers. Click a picture. Its correct motion is played slowly, and beside it a motion with a method or a timestep that fails. The live arm starts too.",
+    text: "Twelve arms that are hard to simulate: light links, high gains, extreme numbers. Click a picture. Its correct motion is played "
+      + "slowly, and beside it a motion with a method or a timestep that fails. The live arm starts too.",
     scene: (links) => structuredClone(DEFAULTS[links]),
     chart: "pictures", dial: null,
     task: { text: "Start three of them.", done: ({ scenes }) => scenes.size >= SOME_SCENES },
@@ -179,7 +194,8 @@ export const STEPS = [
   },
   {
     id: "own", title: "Your own arm",
-    text: "Fill in your arm and the gains of its controller. The sheet shows the largest period and timestep that they allow, the reason, and the benefit of a better method.",
+    text: "Fill in your arm and the gains of its controller. The sheet shows the largest period and timestep that they allow, the reason, and "
+      + "the benefit of a better method.",
     scene: (links) => controlled(links, 0.001),
     chart: "form", dial: null,
     task: { text: "Make the sheet of your arm.", done: ({ sheet }) => sheet },

@@ -282,7 +282,10 @@ function show() {
   byId("course-start").disabled = state.links === 0 || lost;
   byId("course-back").disabled = at === 0;
   byId("course-next").disabled = at === STEPS.length - 1;
-  [...byId("course-steps").children].forEach((button, i) => { if (i === at) button.setAttribute("aria-current", "step"); else button.removeAttribute("aria-current"); });
+  [...byId("course-steps").children].forEach((button, i) => {
+    if (i === at) button.setAttribute("aria-current", "step");
+    else button.removeAttribute("aria-current");
+  });
   byId("course-chart").hidden = !CHARTS[one.chart].draw || one.chart === "pictures";
   markOutdated(false);
   byId("course-extra").replaceChildren();
@@ -306,14 +309,16 @@ function fillExtra(one) {
       type: "button", class: "small", "data-mass": mass, onclick: () => changed(setParams({ masses: [...state.params.masses.slice(0, -1), mass] })),
     }, `last link ${mass} kg`))));
   }
-  if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure", onclick: ({ target }) => busy(target, "Measuring…", measure) }, "Measure"));
+  if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure",
+    onclick: ({ target }) => busy(target, "Measuring…", measure) }, "Measure"));
   if (one.chart === "pictures") place.append(gallery(state.links));
   if (one.chart === "form") showForm(place, () => { now.seen.sheet = true; look(); });
 }
 
 /** The effort limit, and what the integral does at it. */
 function motorButtons() {
-  const choices = [["no limit", null, "clamp"], ["no cure", WEAK, "none"], ["conditional", WEAK, "conditional"], ["back-calculation", WEAK, "back_calculation"]];
+  const choices = [["no limit", null, "clamp"], ["no cure", WEAK, "none"], ["conditional", WEAK, "conditional"],
+    ["back-calculation", WEAK, "back_calculation"]];
   const set = (weak, anti_windup) => changed(setMotors({ effort: weak && weak[state.links], anti_windup }));
   return el("div", { class: "buttons", role: "group", "aria-label": "effort limit and anti-windup" }, ...choices.map(([name, weak, anti]) => el("button", {
     type: "button", class: "small", "data-motors": JSON.stringify([weak !== null, anti]), disabled: !state.motors, onclick: () => set(weak, anti),
@@ -322,7 +327,8 @@ function motorButtons() {
 
 /** The three gains of joint 1. The other joints have them in proportion. */
 function gainFields() {
-  const ranges = /** @type {Record<string, [string, number, number]>} */ ({ kp: ["N m/rad", 20, 2000], ki: ["N m/(rad s)", 2, 2000], kd: ["N m s/rad", 5, 200] });
+  const ranges = /** @type {Record<string, [string, number, number]>} */ ({
+    kp: ["N m/rad", 20, 2000], ki: ["N m/(rad s)", 2, 2000], kd: ["N m s/rad", 5, 200] });
   return Object.entries(ranges).map(([key, [unit, low, high]]) => {
     const base = SOFT[state.links][key];
     const commit = (value) => changed(setGains({ [key]: base.map((one) => Number(((value * one) / base[0]).toPrecision(6))) }));
@@ -347,7 +353,8 @@ function pictures(scenes, links) {
     const canvas = el("canvas", { "aria-hidden": "true" });
     const { text, act } = offer(scene, links);
     new Surface(canvas, (surface) => drawPicture(surface, scene));
-    return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: act === null, onclick: act }, canvas, el("span", {}, scene.name), el("small", {}, text));
+    return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: act === null, onclick: act }, canvas,
+      el("span", {}, scene.name), el("small", {}, text));
   }))];
 }
 
@@ -412,11 +419,13 @@ function clock(one) {
   if (one.dial !== "timestep") {
     return {
       label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => changed(setPeriod({ period: seconds(ms) })),
-      value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state), fit: (ms) => multipleOf(1e3 * state.integrator.timestep, ms), rule: "it must be a whole number of timesteps",
+      value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state), fit: (ms) => multipleOf(1e3 * state.integrator.timestep, ms),
+        rule: "it must be a whole number of timesteps",
     };
   }
   // In the chart of errors the period does not change. Energy has no limit: a stable method may lose it.
-  const whole = one.chart === "errors" ? { high: 4, fit: (ms) => partOf(1e3 * (state.period?.period ?? 0), ms), rule: "it must divide the control period" } : { high: 100 };
+  const whole = one.chart === "errors"
+    ? { high: 4, fit: (ms) => partOf(1e3 * (state.period?.period ?? 0), ms), rule: "it must divide the control period" } : { high: 100 };
   return {
     label: "timestep", unit: "ms", low: 0.1, ...whole, commit: (ms) => changed(setIntegrator({ timestep: seconds(ms) })),
     value: () => 1e3 * (state.integrator?.timestep ?? NaN), limit: () => NaN,
@@ -439,7 +448,8 @@ function makeDial(one) {
     return dial.show();
   }
   const { value, limit, ...options } = one.dial === "damping"
-    ? { label: "damping gains", unit: "times", low: FACTORS.low, high: FACTORS.high, commit: (factor) => changed(setGains({ kd: damped(factor) })), value: damping, limit: () => NaN }
+    ? { label: "damping gains", unit: "times", low: FACTORS.low, high: FACTORS.high, commit: (factor) => changed(setGains({ kd: damped(factor) })),
+      value: damping, limit: () => NaN }
     : clock(one);
   const field = numberField({ log: true, ...options });
   dial = { show: () => { field.accept(Number(value().toPrecision(6))); field.mark(one.guess && !now.ticked ? NaN : limit()); } };
@@ -521,9 +531,14 @@ function showTask() {
   if (place.dataset.shown === key) return;
   place.dataset.shown = key;
   place.replaceChildren();
-  if (guess && began && guessed < 0) ask(place, guess, -1, (k) => { now.guessed = k; show(); byId("course-dial").querySelector("input")?.focus({ preventScroll: true }); });
+  if (guess && began && guessed < 0) ask(place, guess, -1, (k) => {
+    now.guessed = k;
+    show();
+    byId("course-dial").querySelector("input")?.focus({ preventScroll: true });
+  });
   else if (ticked) {
-    if (guess) place.append(el("p", { class: "note" }, `${guessed === guess.right ? "Your guess was right." : `You guessed ${guess.answers[guessed]}.`} ${guess.because}`));
+    if (guess) place.append(el("p", { class: "note" },
+      `${guessed === guess.right ? "Your guess was right." : `You guessed ${guess.answers[guessed]}.`} ${guess.because}`));
     ask(place, question, answered, (k) => {
       now.answered = k;
       showTask();

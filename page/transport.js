@@ -72,7 +72,8 @@ function showNotice() {
   box.hidden = !notice;
   byId("stage").classList.toggle("diverged", notice?.key === "diverged");
   if (notice?.kind === "bad" && notice.key !== "diverged" && notice.key !== "lost") warn(notice.text); // those two are announced already
-  if (notice) box.replaceChildren(el("p", {}, notice.text), ...notice.buttons.map(([text, act]) => el("button", { type: "button", class: "small", onclick: act }, text)));
+  if (notice) box.replaceChildren(el("p", {}, notice.text),
+    ...notice.buttons.map(([text, act]) => el("button", { type: "button", class: "small", onclick: act }, text)));
 }
 
 function choose() {
@@ -88,14 +89,16 @@ function choose() {
   // No timestep helps if the gains are the cause.
   const other = state.enabled && limitInForce(state).everyPose === 0 ? [["Suggest gains", takeSuggestion]] : [];
   if (kind === "diverged") {
-    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Restart", () => said.report(beginAnew())]] };
+    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`,
+      buttons: [...smaller, ...other, ["Restart", () => said.report(beginAnew())]] };
   }
   if (kind === "beyond" || (kind === "never" && state.enabled)) return { key: "limit", kind: "bad", text: sentence, buttons: [...smaller, ...other] };
   if (diagnostics?.level === 1 && !state.paused && diagnostics.real_time_factor < SLOW) {
     return { key: "slow", kind: "warn", text: `The runtime can't keep up: ${diagnostics.real_time_factor.toFixed(2)} of real time.`, buttons: [] };
   }
   if (state.enabled === false && (goal?.outcome === "active" || state.trial?.running)) {
-    return { key: "controller", kind: "calm", text: "The controller is off, so the arm swings freely and does not follow.", buttons: [["Turn the controller on", () => switchController(true)]] };
+    return { key: "controller", kind: "calm", text: "The controller is off, so the arm swings freely and does not follow.",
+      buttons: [["Turn the controller on", () => switchController(true)]] };
   }
   if (state.paused && goal?.outcome === "active") {
     return { key: "paused", kind: "calm", text: "Paused: the arm does not move.", buttons: [["Run", togglePause]] };

@@ -199,7 +199,8 @@ class Controls(PageTest):
         self.tab("compare")
         press = "document.querySelector('#compare-form button').click(), "  # does nothing while a comparison is computed
         for times, why in (
-            ((10, 0), "duration must be greater than 0"), ((10, -1), "duration must be greater than 0"), ((1000, 0.5), "duration must be at least the timestep 1"),
+            ((10, 0), "duration must be greater than 0"), ((10, -1), "duration must be greater than 0"), ((1000, 0.5),
+                "duration must be at least the timestep 1"),
             ((-5, 5), "timestep must be greater than 0"), ((0, 5), "timestep must be greater than 0"),
         ):
             self.page.run(f"document.querySelectorAll('#compare-form {NUMBER}').forEach((one, i) => {{ one.value = {list(times)}[i]; }})")
@@ -268,7 +269,8 @@ class Controls(PageTest):
 
     def test_everything_is_reached_by_the_tab_key_and_named(self):
         named = self.page.run("""[...document.querySelectorAll('button, input, select, summary, canvas[tabindex]')]
-            .filter((one) => one.checkVisibility() && !(one.textContent.trim() || one.ariaLabel || one.labels?.length || one.title)).map((one) => one.outerHTML)""")
+            .filter((one) => one.checkVisibility() && !(one.textContent.trim() || one.ariaLabel || one.labels?.length || one.title))
+            .map((one) => one.outerHTML)""")
         self.assertEqual(named, [])
         seen = set()
         for _ in range(120):
@@ -294,8 +296,10 @@ class Controls(PageTest):
 
     def test_a_refused_setting_of_a_link_is_shown(self):
         for link, why in (
-            ("setpoint=1,2,3", "setpoint must have 2 entries, got 3"), ("setpoint=abc,1", "setpoint 1 must be a number"), ("gravity=", "gravity must be a number"),
-            ("method=foo&gravity=3", 'method must be one of euler, midpoint, verlet, rk4, got "foo"'), ("controller=maybe", 'controller must be on or off, got "maybe"'),
+            ("setpoint=1,2,3", "setpoint must have 2 entries, got 3"), ("setpoint=abc,1", "setpoint 1 must be a number"), ("gravity=",
+                "gravity must be a number"),
+            ("method=foo&gravity=3", 'method must be one of euler, midpoint, verlet, rk4, got "foo"'), ("controller=maybe",
+                'controller must be on or off, got "maybe"'),
         ):
             self.page.run(f"location.hash = '{link}'")
             self.page.until(f"document.querySelector('#offer .offer-text')?.textContent.startsWith('{link.split('=')[0]}')", why=link)

@@ -29,7 +29,9 @@ test("every question has one right answer, with the reason", () => {
 });
 
 test("no task is done before anything is done, and each can be", () => {
-  const all = { methods: new Set(["euler", "midpoint", "verlet", "rk4"]), reached: true, shook: true, shrinks: true, gain: 100, stable: true, measured: true, scenes: new Set("123"), energy: { timestep: 0.005, since: 0.01, until: 10, low: -0.05, high: 0.1 }, sheet: true, responses: { sag: true, overshoot: true, windup: true, cure: true } };
+  const all = { methods: new Set(["euler", "midpoint", "verlet", "rk4"]), reached: true, shook: true, shrinks: true, gain: 100, stable: true,
+    measured: true, scenes: new Set("123"), energy: { timestep: 0.005, since: 0.01, until: 10, low: -0.05, high: 0.1 }, sheet: true,
+      responses: { sag: true, overshoot: true, windup: true, cure: true } };
   for (const { id, task } of STEPS) {
     assert.equal(task.done(nothingSeen()), false, id);
     assert.equal(task.done(all), true, id);

@@ -1,7 +1,7 @@
 // Numbers as text, scales, settings in links, and the inverse of each.
 
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
+import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
 
 import { duration, fixed, inPageNames, multipleOf, partOf, plain, short, significant } from "../../page/format.js";
@@ -67,7 +67,8 @@ test("a link may have fewer settings, the arm's start, and unknown names, which 
 });
 
 test("a wrong value in a link is kept, because the runtime refuses it", () => {
-  const { integrator, params, gains, period, controller, setpoint } = fromFragment("#method=leapfrog&gravity=&masses=1,&kp= &period=x&delay=maybe&controller=constructor&setpoint=");
+  const { integrator, params, gains, period, controller, setpoint } = fromFragment("#method=leapfrog&gravity=&masses=1,&kp= "
+    + "&period=x&delay=maybe&controller=constructor&setpoint=");
   assert.deepEqual([integrator, params, gains], [{ method: "leapfrog" }, { gravity: NaN, masses: [1, NaN] }, { kp: [NaN] }]);
   assert.deepEqual([period, controller, setpoint], [{ period: NaN, delay: "maybe" }, "constructor", [NaN]]);
 });
@@ -108,7 +109,8 @@ test("a refusal keeps the runtime's names until it is shown", async () => {
 test("a refusal has the names of the page's fields", () => {
   const shown = {
     "kp[0] must be a number, got null; kp[1] must be a number, got null": "kp 1 must be a number; kp 2 must be a number",
-    "epsilon must be greater than 0, got -1; success_hold must be at least 0, got -1": "tolerance must be greater than 0, got -1; hold must be at least 0, got -1",
+    "epsilon must be greater than 0, got -1; success_hold must be at least 0, got -1":
+      "tolerance must be greater than 0, got -1; hold must be at least 0, got -1",
     "phi = 2 puts the wrist 3.4 m from the base": "orientation = 2 puts the wrist 3.4 m from the base",
     "effort[0] must be a number, got null": "torque 1 must be a number",
     "effort must have 2 entries, got 1": "torque must have 2 entries, got 1",
@@ -121,7 +123,8 @@ test("a refusal has the names of the page's fields", () => {
 
 test("the WebSocket is in the folder of the page, also behind a proxy", () => {
   const pages = {
-    "http://127.0.0.1:9095/": "ws://127.0.0.1:9095/", "https://host/arm1/": "wss://host/arm1/", "https://host/arm1/index.html?links=2#step=own": "wss://host/arm1/",
+    "http://127.0.0.1:9095/": "ws://127.0.0.1:9095/", "https://host/arm1/": "wss://host/arm1/",
+      "https://host/arm1/index.html?links=2#step=own": "wss://host/arm1/",
   };
   for (const [page, socket] of Object.entries(pages)) assert.equal(socketAddress(page), socket);
 });
@@ -149,5 +152,14 @@ test("each link of the worksheets sets everything", () => {
       assert.deepEqual(Object.keys(settings[key] ?? {}).sort(), Object.keys(wanted ?? {}).sort(), `${key} in ${link}`);
     }
     assert.deepEqual([settings.start.position.length, settings.start.velocity.length], [2, 2]);
+  }
+});
+
+test("no line of the page and its tests is longer than 160 characters", () => {
+  for (const folder of ["../../page/", "../page/", "../browser/"].map((path) => new URL(path, import.meta.url))) {
+    for (const name of readdirSync(folder).filter((one) => /\.(js|mjs|html|css|svg|py)$/.test(one))) {
+      const long = readFileSync(new URL(name, folder), "utf8").split("\n").findIndex((line) => [...line].length > 160);
+      assert.equal(long, -1, `${name}: line ${long + 1}`);
+    }
   }
 });
