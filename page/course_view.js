@@ -16,6 +16,7 @@ import { latestOnly } from "./latest.js";
 import { drawMotions, FAILING, motionOf, motionsOf } from "./motions.js";
 import { controlPeriodLimit, verdict } from "./policy.js";
 import { fromRest, questionOf, stepsPerUpdate } from "./question.js";
+import { connectionText } from "./readouts.js";
 import { pause, rollout, setGains, setIntegrator, setMotors, setParams, setPeriod, setState, step as stepArm } from "./runtime.js";
 import { judge, keep as keepResponse, LASTS, nameOf, present, shown } from "./responses.js";
 import { LogScale } from "./scale.js";
@@ -26,7 +27,6 @@ import { state, watch, watchAll } from "./store.js";
 import { StripChart } from "./strip_chart.js";
 import { climb, climbRows, deviation } from "./study.js";
 import { Surface } from "./surface.js";
-import { connectionText } from "./transport.js";
 
 const FIRST = 0.5; // s: in this time of a response its settings are read
 const SHAKES = 2; // rad/s: a visible speed beyond the limit

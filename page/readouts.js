@@ -73,3 +73,16 @@ export function describeArm() {
   setText(byId("arm-text"), `${state.links} links, ${runState()}, controller ${state.enabled ? "on" : "off"}. Joints at ${degrees.join(", ")} degrees. `
     + `End effector at x ${fixed(x, 2)}, y ${fixed(y, 2)} metres.${goal}`);
 }
+
+/** Attempts to connect before the page says what may be wrong. */
+export const MANY = 3;
+
+/** Why the page has no arm, and what may help; empty while it has one. */
+export function connectionText() {
+  const { connection, failures, links } = state;
+  if (connection === "open") return "";
+  if (connection === "silent") return "No answer from the arm. The figures are old.";
+  const text = links > 0 ? "Connection lost. Trying again…" : "Connecting to the arm…";
+  if (failures < MANY || isAlone) return text;
+  return `${text} The server may be stopped. Or it refuses pages of this address: then start it with --allow-origin ${location.origin}`;
+}

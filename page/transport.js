@@ -7,7 +7,7 @@ import { announce, byId, el, passFocus, setText, warn } from "./dom.js";
 import { refusal } from "./field.js";
 import { duration, fixed } from "./format.js";
 import { limitInForce, SLOW, verdict } from "./policy.js";
-import { isAlone } from "./kernel.js";
+import { connectionText, MANY } from "./readouts.js";
 import { pause, setPeriod, step } from "./runtime.js";
 import { LOOP, state, watch } from "./store.js";
 
@@ -43,19 +43,6 @@ export async function singleStep() {
 }
 
 // Notices, the most serious first
-
-/** Attempts to connect before the page says what may be wrong. */
-const MANY = 3;
-
-/** Why the page has no arm, and what may help; empty while it has one. */
-export function connectionText() {
-  const { connection, failures, links } = state;
-  if (connection === "open") return "";
-  if (connection === "silent") return "No answer from the arm. The figures are old.";
-  const text = links > 0 ? "Connection lost. Trying again…" : "Connecting to the arm…";
-  if (failures < MANY || isAlone) return text;
-  return `${text} The server may be stopped. Or it refuses pages of this address: then start it with --allow-origin ${location.origin}`;
-}
 
 function showNotice() {
   const notice = choose();
