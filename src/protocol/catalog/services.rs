@@ -38,6 +38,10 @@ table! {
         SetParams = changes("/arm_sim/set_params", "pendularm_interfaces/srv/SetParams")
             .request(PARAMS)
             .response(PARAMS),
+        /// Viscous friction of the joints.
+        SetFriction = changes("/arm_sim/set_friction", "pendularm_interfaces/srv/SetFriction")
+            .request(fields!["float64[] viscous?  # N m s/rad"])
+            .response(fields!["float64[] viscous  # N m s/rad"]),
         /// Freezes and resumes simulation time.
         Pause = of_arm("/arm_sim/pause", "pendularm_interfaces/srv/Pause")
             .request(SWITCH)

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 const WITHOUT_ROWS: &str = "name";
 
 /// Services that apply each field separately, with valid values that differ from the present ones.
-const FIELD_BY_FIELD: [(&str, &str); 8] = [
+const FIELD_BY_FIELD: [(&str, &str); 9] = [
     (
         "/arm_sim/set_integrator",
         r#"{"method":"euler","timestep":0.002}"#,
@@ -23,6 +23,7 @@ const FIELD_BY_FIELD: [(&str, &str); 8] = [
         "/arm_sim/set_params",
         r#"{"gravity":2.0,"masses":[2.0,3.0],"lengths":[0.5,0.25]}"#,
     ),
+    ("/arm_sim/set_friction", r#"{"viscous":[0.5,0.25]}"#),
     ("/arm_sim/pause", r#"{"data":true}"#),
     (
         "/arm_sim/set_state",
