@@ -7,7 +7,7 @@ import { METHODS, seconds, shortName } from "./format.js";
 import { limitLabel } from "./stability_panel.js";
 import { controlPeriodLimit, limitInForce, periodText } from "./policy.js";
 import { questionOf } from "./question.js";
-import { enable, sendSetpoint, setGains, setIntegrator, setMotors, setParams, setPeriod, suggestGains } from "./runtime.js";
+import { enable, sendSetpoint, setFriction, setGains, setIntegrator, setMotors, setParams, setPeriod, suggestGains } from "./runtime.js";
 import { LOOP, set, state, watch } from "./store.js";
 
 const PLACES = [["Earth", 9.81], ["Moon", 1.62], ["Mars", 3.72], ["Jupiter", 24.79], ["none", 0]];
@@ -32,7 +32,7 @@ export function startControls() {
   suggestSaid = refusal(suggestButton);
   byId("suggest").append(suggestButton, suggestSaid.element);
   watch("links", makeJointFields);
-  watch(["params", "gains", "motors", "setpoint"], showStored);
+  watch(["params", "gains", "friction", "motors", "setpoint"], showStored);
   watch("joint", (joint) => { for (const [i, radio] of radios("joint").entries()) radio.checked = i === joint; });
 }
 
@@ -140,6 +140,10 @@ function makeJointFields(links) {
   gain("kp", "N m/rad", 20000, "proportional gain");
   gain("ki", "N m/(rad s)", 50000, "integral gain");
   gain("kd", "N m s/rad", 1000, "derivative gain");
+  fill("friction-fields", links, {
+    unit: "N m s/rad", low: 0.01, high: 100, log: true, zero: true, name: "friction", stored: () => state.friction?.viscous,
+    send: (viscous) => setFriction({ viscous }),
+  });
   fill("limit-fields", links, {
     unit: "N m", low: 1, high: 1000, log: true, name: "effort limit", stored: () => state.motors?.effort ?? undefined, send: (effort) => setMotors({ effort }),
   });

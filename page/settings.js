@@ -12,6 +12,7 @@ import { exact } from "./format.js";
  * @property {Partial<Arm> | null} params
  * @property {Partial<Gains> | null} gains
  * @property {{period?: number, delay?: boolean} | null} period the control period, 0 for every step [s]
+ * @property {{viscous?: number[]} | null} friction of each joint [N m s/rad]
  * @property {{effort?: number[] | null, anti_windup?: string, tracking_time?: number} | null} motors their limits [N m], null for none
  * @property {boolean | null} controller whether it is on
  * @property {number[] | null} setpoint
@@ -30,6 +31,7 @@ export const DEFAULTS = {
     params: { gravity: 9.81, masses: [1, 1], lengths: [1, 1] },
     gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] },
     period: { period: 0, delay: false },
+    friction: { viscous: [0, 0] },
     motors: { effort: null, anti_windup: "clamp", tracking_time: 0.2 },
     controller: false,
     setpoint: [0, 0],
@@ -39,6 +41,7 @@ export const DEFAULTS = {
     params: { gravity: 9.81, masses: [1, 1, 1], lengths: [1, 1, 1] },
     gains: { kp: [2200, 180, 80], ki: [3500, 300, 185], kd: [160, 38, 4.8] },
     period: { period: 0, delay: false },
+    friction: { viscous: [0, 0, 0] },
     motors: { effort: null, anti_windup: "clamp", tracking_time: 0.2 },
     controller: false,
     setpoint: [0, 0, 0],
@@ -46,13 +49,14 @@ export const DEFAULTS = {
 };
 
 /** The present settings; null until all are known. @returns {Settings | null} */
-export function presentSettings(/** @type {any} */ { links, integrator, params, gains, period, motors, enabled, setpoint, setpointKnown }) {
+export function presentSettings(/** @type {any} */ { links, integrator, params, gains, period, friction, motors, enabled, setpoint, setpointKnown }) {
   if (!integrator || !params || !gains || !period || enabled == null) return null;
   return {
     integrator,
     params,
     gains,
     period: { period: period.period, delay: period.delay },
+    friction: friction ?? null,
     motors: motors ?? null,
     controller: enabled,
     setpoint: setpointKnown ? Array.from(setpoint.subarray(0, links)) : null,
@@ -65,7 +69,7 @@ export function hasSettings(settings) {
 }
 
 /** @param {Settings} settings @param {number} links */
-export function toFragment({ integrator, params, gains, period, motors, controller, setpoint }, links) {
+export function toFragment({ integrator, params, gains, period, friction, motors, controller, setpoint }, links) {
   const list = (/** @type {number[]} */ values) => values.map(exact).join(",");
   const parts = [
     ["links", links], ["method", integrator?.method], ["timestep", exact(integrator?.timestep ?? NaN)],
@@ -73,6 +77,7 @@ export function toFragment({ integrator, params, gains, period, motors, controll
     ["kp", list(gains?.kp ?? [])], ["ki", list(gains?.ki ?? [])], ["kd", list(gains?.kd ?? [])],
     ["period", exact(period?.period ?? NaN)], ["delay", period?.delay ? "on" : "off"], ["controller", controller ? "on" : "off"],
   ];
+  if (friction?.viscous) parts.push(["viscous", list(friction.viscous)]);
   if (motors) {
     parts.push(["effort_limit", motors.effort ? list(motors.effort) : "none"], ["anti_windup", motors.anti_windup]);
     parts.push(["tracking_time", exact(motors.tracking_time ?? NaN)]);
@@ -101,6 +106,7 @@ export function fromFragment(/** @type {string} */ hash) {
     params: pick(["gravity", "masses", "lengths"], (name) => (name === "gravity" ? single(name) : numbers(name))),
     gains: pick(["kp", "ki", "kd"], numbers),
     period: pick(["period", "delay"], (name) => (name === "period" ? single(name) : onOff(name))),
+    friction: pick(["viscous"], numbers),
     motors: motorsIn(given, numbers, single),
     controller: onOff("controller") ?? null,
     setpoint: numbers("setpoint") ?? null,

@@ -9,6 +9,25 @@ class Controls(PageTest):
     def field(self, name, joint=None):
         return f"#{name} {NUMBER}" if joint is None else f"#{name} .field:nth-of-type({joint}) {NUMBER}"
 
+    # Realism
+
+    def test_switches_limit_the_efforts_and_add_friction_and_a_link_has_both(self):
+        self.page.until("document.querySelector('#realism').checkVisibility() && document.querySelector('#friction-switch').checkVisibility()")
+        self.page.click("#limit-switch")
+        self.wait(lambda: self.values("/pid_controller/set_limits")["effort"] == [30, 8], "1.5 times the weight")
+        self.page.fill(self.field("limit-fields", 1), "25")
+        self.wait(lambda: self.values("/pid_controller/set_limits")["effort"] == [25, 8], "a limit")
+        self.page.run("(() => { const one = document.querySelector('#limit-options select'); one.value = 'conditional';"
+                      " one.dispatchEvent(new Event('change')); })()")
+        self.wait(lambda: self.values("/pid_controller/set_limits")["anti_windup"] == "conditional", "a cure")
+        self.page.click("#friction-switch")
+        self.wait(lambda: self.values("/arm_sim/set_friction")["viscous"] == [1, 1], "friction")
+        link = self.page.run("own('views.js').then((share) => share.address())")
+        self.assertIn("viscous=1,1&effort_limit=25,8&anti_windup=conditional", link)
+        self.page.click("#limit-switch")
+        self.page.click("#friction-switch")
+        self.wait(lambda: (self.values("/pid_controller/set_limits")["effort"], self.values("/arm_sim/set_friction")["viscous"]) == (None, [0, 0]), "off")
+
     # The view
 
     def test_a_shift_drag_places_the_setpoint_without_a_goal(self):
