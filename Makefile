@@ -59,6 +59,7 @@ check-study: ## Check the study on COUNT=10000 random arms, gains, poses and set
 test-page: node_modules page ## Check the page's types, test its logic without a browser, and compare its kernel with native runs; needs node 20 with npm
 	@echo "make test-page: types, unit tests, then the runs of the kernel"
 	node_modules/.bin/tsc
+	node_modules/.bin/tsc --project tsconfig.strict.json
 	node --test tests/page/
 	$(CARGO) run --locked --quiet --package pendularm-wasm --example runs > "$(TARGET_DIR)/runs.txt"
 	node tests/page/runs.mjs "$(TARGET_DIR)/runs.txt" pendularm.html
