@@ -15,7 +15,7 @@
 //! | `batch` | yes | `math::simulation::batch`: many arms in the lanes of the processor's registers |
 //! | `report` | yes | `report`, with its experiments |
 //! | `record` | yes | `record`: records of runs, written, read and replayed |
-//! | `cli` | yes | `command`: commands for a running pendularm, completions |
+//! | `cli` | yes | `command`: commands for a running pendularm, completions; `score` |
 //!
 //! Without default features the library is [`math`] and [`study`], which is enough to step arms. Its dependencies
 //! are then `glam`, `libm` and `thiserror`. With `batch`, and `fearless_simd`, a free step of Runge-Kutta 4 on x86-64
@@ -58,6 +58,8 @@ pub mod protocol;
 pub mod record;
 #[cfg(feature = "report")]
 pub mod report;
+#[cfg(feature = "cli")]
+pub mod score;
 #[cfg(feature = "services")]
 pub mod services;
 #[cfg(feature = "runtime")]

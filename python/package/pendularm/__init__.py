@@ -11,7 +11,9 @@ from importlib.metadata import version as _version
 from . import dynamics
 from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
 from ._page import Page, page
+from ._ray import RayExecutor
 from .report import read_report
+from .scores import score, submission
 from .study import Critical, Plan, Rollout, Stability, SuggestedGains, plan, rollout, stability, suggest_gains
 from .sweep import Run, Sweep, sweep
 
@@ -24,6 +26,7 @@ __all__ = [
     "Divergence",
     "Page",
     "Plan",
+    "RayExecutor",
     "Rollout",
     "Run",
     "Simulation",
@@ -38,7 +41,9 @@ __all__ = [
     "plan",
     "read_report",
     "rollout",
+    "score",
     "stability",
+    "submission",
     "suggest_gains",
     "sweep",
 ]
