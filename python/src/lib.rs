@@ -12,6 +12,7 @@ mod batch;
 mod dynamics;
 mod fields;
 mod gains;
+mod held;
 mod patience;
 mod simulation;
 mod study;
@@ -34,6 +35,8 @@ mod native {
     use crate::fields::{is_masked, is_too_long};
     #[pymodule_export]
     use crate::gains::default_gains;
+    #[pymodule_export]
+    use crate::held::held_limit;
     #[pymodule_export]
     use crate::simulation::{Divergence, Simulation};
     #[pymodule_export]

@@ -10,6 +10,7 @@ from importlib.metadata import version as _version
 
 from . import dynamics
 from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
+from .held import HeldLimit, HeldMode, held_limit
 from .report import read_report
 from .study import Critical, Plan, Rollout, Stability, SuggestedGains, plan, rollout, stability, suggest_gains
 from .sweep import Run, Sweep, sweep
@@ -21,6 +22,8 @@ __all__ = [
     "Batch",
     "Critical",
     "Divergence",
+    "HeldLimit",
+    "HeldMode",
     "Plan",
     "Rollout",
     "Run",
@@ -31,6 +34,7 @@ __all__ = [
     "default_gains",
     "dynamics",
     "end_effector",
+    "held_limit",
     "inverse_kinematics",
     "plan",
     "read_report",
