@@ -33,6 +33,11 @@ use crate::math::integrator::Method;
 /// have errors of some 1e-13.
 pub(super) const NEUTRAL: f64 = 1e-11;
 
+/// Modes below this part of the fastest rate say nothing about the timestep. Rounding spreads a double eigenvalue at zero,
+/// such as that of a joint that drifts, to the square root of its size, so such a mode may only seem to grow. The growth
+/// that a timestep causes is below [`NEUTRAL`] for all of them, and [`slow_modes`] finds growth in continuous time.
+const DOUBTFUL: f64 = 1e-6;
+
 /// Start of the search, in units of the fastest time constant. An undamped swing already grows measurably here under
 /// Euler (1e-3) and midpoint (2.5e-10).
 const SEARCH_START: f64 = 1e-3;
@@ -90,7 +95,7 @@ impl Modes {
         let eigenvalues = flow.eigenvalues();
         let rate = largest(eigenvalues.iter().map(|mode| mode.modulus()));
         Self {
-            slow_growth: slow_modes::grows(flow, &eigenvalues, rate, NEUTRAL * rate),
+            slow_growth: slow_modes::grows(flow, &eigenvalues, rate, DOUBTFUL * rate),
             rate,
             eigenvalues,
         }
@@ -107,12 +112,19 @@ impl Modes {
         growth.fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// Whether a mode clearly grows, also if rounding has spread a double eigenvalue near zero.
+    pub(super) fn clearly_grow(&self) -> bool {
+        let least = DOUBTFUL * self.rate;
+        let grows = |mode: &Complex| mode.modulus() >= least && mode.re > 0.1 * NEUTRAL * self.rate;
+        self.slow_growth || self.eigenvalues.iter().any(grows)
+    }
+
     /// Whether a mode is unstable at every timestep. It grows, or is so close to neutral that rounding decides its
     /// sign: a double eigenvalue near zero has an error of the square root of the rounding error.
     pub(super) fn run_away(&self) -> bool {
         let noise = 0.1 * NEUTRAL * self.rate;
         let grows = |mode: &Complex| {
-            let is_doubtful = mode.modulus() > 0.0 && mode.modulus() < 1e-6 * self.rate;
+            let is_doubtful = mode.modulus() > 0.0 && mode.modulus() < DOUBTFUL * self.rate;
             mode.re > if is_doubtful { -noise } else { noise } || mode.re.is_nan()
         };
         self.slow_growth || self.eigenvalues.iter().any(grows)
@@ -244,7 +256,11 @@ pub(super) fn growth(generator: &Matrix, period: f64) -> f64 {
         return 0.0;
     }
     let growth = |mu: Complex| 2.0 * mu.re + period * mu.modulus() * mu.modulus();
-    let growths = values.into_iter().map(|mu| growth(mu) / fastest);
+    let growths = values.into_iter().map(|mu| {
+        let is_doubtful = mu.modulus() < DOUBTFUL * fastest;
+        let growth = growth(mu) / fastest;
+        if is_doubtful { growth.min(0.0) } else { growth }
+    });
     largest_above(f64::NEG_INFINITY, growths)
 }
 

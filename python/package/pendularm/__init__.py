@@ -11,6 +11,7 @@ from importlib.metadata import version as _version
 from . import dynamics
 from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
 from .held import HeldLimit, HeldMode, held_limit
+from ._page import Page, page
 from .report import read_report
 from .study import Critical, Plan, Rollout, Stability, SuggestedGains, plan, rollout, stability, suggest_gains
 from .sweep import Run, Sweep, sweep
@@ -24,6 +25,7 @@ __all__ = [
     "Divergence",
     "HeldLimit",
     "HeldMode",
+    "Page",
     "Plan",
     "Rollout",
     "Run",
@@ -36,6 +38,7 @@ __all__ = [
     "end_effector",
     "held_limit",
     "inverse_kinematics",
+    "page",
     "plan",
     "read_report",
     "rollout",
