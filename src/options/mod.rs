@@ -25,6 +25,8 @@ use crate::logging::LogFormat;
 use crate::plan::PlanOptions;
 pub use crate::protocol::limits::{DEFAULT_CLIENTS, MAX_CLIENTS};
 use crate::protocol::op::token::Token;
+#[cfg(feature = "conformance")]
+use crate::referee::ConformanceOptions;
 #[cfg(feature = "report")]
 use crate::report::ReportOptions;
 pub use crate::value::Links;
@@ -143,6 +145,9 @@ pub enum Parsed {
         /// The record, from --record or /recorder/start
         file: PathBuf,
     },
+    /// Test any server of the protocol against the rules of the specification
+    #[cfg(feature = "conformance")]
+    Conformance(Box<ConformanceOptions>),
     /// A command for a running pendularm.
     #[cfg(feature = "cli")]
     #[command(flatten)]

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::arrows::{PENDULARM, SourceTree};
 
 /// Layers that a layer may import, besides itself. A row names only rows above it.
-const LAYERS: [(&str, &[&str]); 19] = [
+const LAYERS: [(&str, &[&str]); 20] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
@@ -24,10 +24,12 @@ const LAYERS: [(&str, &[&str]); 19] = [
         &["protocol", "output", "address", "value", "signals"],
     ),
     ("plan", &["math", "study", "value"]),
+    ("referee", &["output", "value", "signals"]),
     (
         "options",
         &[
             "protocol", "web", "report", "command", "logging", "address", "value", "plan",
+            "referee",
         ],
     ),
     (
@@ -42,7 +44,7 @@ const LAYERS: [(&str, &[&str]); 19] = [
         "main",
         &[
             "command", "logging", "output", "record", "report", "options", "plan", "actors",
-            "signals",
+            "signals", "referee",
         ],
     ),
 ];
