@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build install run page test conformance check-study test-page test-browser test-clients simulate fuzz attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
+.PHONY: help build install run page site test conformance check-study test-page test-browser test-clients simulate fuzz attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -15,7 +15,9 @@ build: ## Build the release program; needs no network once the dependencies are 
 	@echo "make build: $(TARGET_DIR)/release/pendularm"
 	$(CARGO) build --release --locked
 
-install: build ## Install program and completions below PREFIX=/usr/local, in DESTDIR
+install: ## Install program and completions below PREFIX=/usr/local, in DESTDIR; without cargo the program that is already built
+	@if command -v "$(firstword $(CARGO))" > /dev/null; then $(MAKE) --no-print-directory build; \
+	elif [ ! -x "$(TARGET_DIR)/release/pendularm" ]; then echo "make install: needs cargo, or a program that is built already: $(TARGET_DIR)/release/pendularm" >&2; exit 1; fi
 	@echo "make install: $(DESTDIR)$(or $(PREFIX),/usr/local)"
 	@bash scripts/install.sh "$(TARGET_DIR)/release/pendularm" "$(DESTDIR)$(or $(PREFIX),/usr/local)"
 
@@ -57,9 +59,14 @@ check-study: ## Check the study on COUNT=10000 random arms, gains, poses and set
 test-page: node_modules page ## Check the page's types, test its logic without a browser, and compare its kernel with native runs; needs node 20 with npm
 	@echo "make test-page: types, unit tests, then the runs of the kernel"
 	node_modules/.bin/tsc
+	node_modules/.bin/tsc --project tsconfig.strict.json
 	node --test tests/page/
 	$(CARGO) run --locked --quiet --package pendularm-wasm --example runs > "$(TARGET_DIR)/runs.txt"
 	node tests/page/runs.mjs "$(TARGET_DIR)/runs.txt" pendularm.html
+
+site: ## Write the files of the public pages to OUT=site: the page, the lessons, the kept report, the library's documentation; needs python3 and a network the first time
+	@echo "make site: $(or $(OUT),site)"
+	@CARGO="$(CARGO)" bash scripts/site.sh "$(or $(OUT),site)"
 
 node_modules: package-lock.json
 	npm ci --silent --no-audit --no-fund

@@ -9,6 +9,7 @@ import { announce, byId, fillTable, setText } from "./dom.js";
 import { busy, option, panel, withoutFigure } from "./field.js";
 import { duration, fixed, METHODS, significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
+import { fromRest, questionOf, withFixedPeriod } from "./question.js";
 import { describeRun, distances, endOf } from "./ladder.js";
 import { rollout } from "./runtime.js";
 import { Axis, LogScale, powerOfTen, times } from "./scale.js";
@@ -64,13 +65,12 @@ export function startCompare() {
 }
 
 async function compare() {
-  if (state.links === 0 || !state.params) {
+  const present = questionOf({ ...state, enabled: controller.input.value === "on" });
+  if (!present || state.connection !== "open") {
     said.show("There is no arm to compare: not connected.");
     return;
   }
   const n = state.links;
-  const zero = new Array(n).fill(0);
-  const still = from.input.value === "rest";
   const step = (timestep.number() ?? 1e3 * state.integrator.timestep) / 1e3;
   const asked = seconds.number() ?? SECONDS;
   // A whole number of steps between samples, so all runs are sampled at the same times. The runtime refuses wrong times.
@@ -78,20 +78,18 @@ async function compare() {
   const every = Math.ceil(steps / MOST_SAMPLES);
   const intervals = Math.round(steps / every) || 1;
   const lasts = intervals * every * step || asked;
-  const common = {
-    q0: still ? zero : Array.from(state.position.subarray(0, n)), qdot0: still ? zero : Array.from(state.velocity.subarray(0, n)),
-    duration: lasts, params: state.params, samples: intervals + 1,
-    ...(controller.input.value === "on" ? { gains: state.gains, setpoint: Array.from(state.setpoint.subarray(0, n)) } : {}),
-  };
+  // All runs have one controller, which acts at the same times, also in the reference.
+  const common = withFixedPeriod({ ...(from.input.value === "rest" ? fromRest(present) : present), timestep: step });
+  const run = { duration: lasts, samples: intervals + 1 };
   const wanted = [...METHODS.map(([method]) => ({ integrator: method, timestep: step })), { integrator: "rk4", timestep: step * REFERENCE_PART }];
-  const answers = await Promise.all(wanted.map((one) => rollout({ ...common, ...one })));
+  const answers = await Promise.all(wanted.map((one) => rollout({ ...common, ...one }, run)));
   const refused = answers.find((answer) => !answer.result);
   said.show(withoutFigure(refused?.status ?? ""));
   if (refused) return;
   const found = answers.map(({ values }, i) => ({ ...values, method: wanted[i].integrator, timestep: wanted[i].timestep }));
   const reference = found.pop();
   const away = found.map((run) => distances(run, reference));
-  lengths = state.params.lengths;
+  lengths = present.params.lengths;
   instants = reference.times;
   runs = [...found, reference].map((run, i) => ({ ...tracked(run, n), away: away[i] ?? null, color: i < found.length ? `method${i + 1}` : "muted" }));
   byId("compare-result").hidden = false;

@@ -6,6 +6,7 @@ import { busy, numberField, refusal } from "./field.js";
 import { METHODS, seconds, shortName } from "./format.js";
 import { limitLabel } from "./stability_panel.js";
 import { controlPeriodLimit, limitInForce, periodText } from "./policy.js";
+import { questionOf } from "./question.js";
 import { enable, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, suggestGains } from "./runtime.js";
 import { LOOP, set, state, watch } from "./store.js";
 
@@ -91,7 +92,9 @@ export function switchController(on) {
 /** Requests gains for the present arm and sets them. The change can be undone. */
 export function takeSuggestion() {
   return busy(suggestButton, "Searching…", async () => {
-    const { result, values } = await suggestSaid.report(suggestGains());
+    const question = questionOf({ ...state, setpointKnown: true }); // gains do not depend on it
+    if (!question) return;
+    const { result, values } = await suggestSaid.report(suggestGains(question));
     const { kp, ki, kd } = values.gains ?? values;
     if (result) suggestSaid.report(setGains({ kp, ki, kd }));
   });

@@ -12,7 +12,7 @@ export function startReadouts() {
   watch("connection", (now) => {
     const pill = byId("connection");
     pill.className = `pill ${now}`;
-    setText(byId("connection-text"), { open: isAlone ? "in this page, no server" : "connected", connecting: "connecting…", lost: "reconnecting…" }[now]);
+    setText(byId("connection-text"), { open: isAlone ? "in this page, no server" : "connected", connecting: "connecting…", lost: "reconnecting…", silent: "no answer" }[now]);
   });
   watch(LOOP, showLimit);
 }

@@ -4,8 +4,8 @@
 
 import { exact } from "./format.js";
 
-/** @typedef {import("./policy.js").Gains} Gains */
-/** @typedef {import("./policy.js").Arm} Arm */
+/** @typedef {import("./question.js").Gains} Gains */
+/** @typedef {import("./question.js").Arm} Arm */
 /**
  * @typedef {object} Settings
  * @property {{method?: string, timestep?: number} | null} integrator

@@ -9,7 +9,8 @@ export function nothingAsked() {
 }
 
 export const state = {
-  connection: "connecting", // or "open", "lost"
+  connection: "connecting", // or "open", "lost"; "silent" without a message for some seconds
+  failures: 0, // attempts in a row without a connection
   links: 0, // 0 until the runtime has sent it
   // The latest joint state. Written in place 60 times a second; `version` counts them.
   version: 0,
@@ -28,6 +29,7 @@ export const state = {
   enabled: null, // whether the controller is on
   diagnostics: null, // { level, message, state, ...numbers }
   diverged: false,
+  broken: null, // the question at the divergence, if the page has seen it
   // The answers of /study/stability for the active loop. They have the requested loop (see `policy.js`), the values for
   // each method, and the first limit and speed of the motion since the last reset [s, rad/s].
   limits: nothingAsked(),

@@ -7,6 +7,7 @@ import { announce, byId, el, passFocus, setText, warn } from "./dom.js";
 import { refusal } from "./field.js";
 import { duration, fixed } from "./format.js";
 import { limitInForce, SLOW, verdict } from "./policy.js";
+import { isAlone } from "./kernel.js";
 import { pause, setPeriod, step } from "./runtime.js";
 import { LOOP, state, watch } from "./store.js";
 
@@ -43,6 +44,19 @@ export async function singleStep() {
 
 // Notices, the most serious first
 
+/** Attempts to connect before the page says what may be wrong. */
+const MANY = 3;
+
+/** Why the page has no arm, and what may help; empty while it has one. */
+export function connectionText() {
+  const { connection, failures, links } = state;
+  if (connection === "open") return "";
+  if (connection === "silent") return "No answer from the arm. The figures are old.";
+  const text = links > 0 ? "Connection lost. Trying again…" : "Connecting to the arm…";
+  if (failures < MANY || isAlone) return text;
+  return `${text} The server may be stopped. Or it refuses pages of this address: then start it with --allow-origin ${location.origin}`;
+}
+
 function showNotice() {
   const notice = choose();
   // A button with another figure is another button.
@@ -65,9 +79,9 @@ function choose() {
   const { diagnostics, goal } = state;
   const { kind, sentence, advised, slow } = verdict(state);
   if (kind === "offline") {
-    return state.links === 0
-      ? { key: "connecting", kind: "calm", text: "Connecting to the arm…", buttons: [] }
-      : { key: "lost", kind: "bad", text: "Connection lost. Trying again…", buttons: [] };
+    const { connection, failures, links } = state;
+    const key = connection === "silent" ? connection : links > 0 ? "lost" : "connecting";
+    return { key, kind: links > 0 || failures >= MANY ? "bad" : "calm", text: connectionText(), buttons: [] };
   }
   const smaller = slow ? [["Control at every step", () => said.report(setPeriod({ period: 0 }))]]
     : advised > 0 ? [[`Restart at ${duration(advised)}`, () => said.report(recover(advised))]] : [];

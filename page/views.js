@@ -6,7 +6,7 @@
 import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
 import { chooseLinks, followLink, linksInLink, needed, stepInLink } from "./course_view.js";
-import { announce, byId, el, passFocus, setAddress, setText } from "./dom.js";
+import { announce, byId, el, goToAddress, passFocus, setAddress, setText } from "./dom.js";
 import { isAlone, linksIn } from "./kernel.js";
 import { fromFragment, hasSettings, presentSettings, toFragment } from "./settings.js";
 import { set, state, watch } from "./store.js";
@@ -30,7 +30,7 @@ export function startViews() {
   set("view", viewInLink() || "course");
   // Another link in the address bar of this page, or a click on the sheet's link.
   addEventListener("hashchange", () => {
-    const view = viewInLink();
+    const view = viewInLink() || (location.hash === "" ? "course" : ""); // without a fragment it is the first address
     if (!view) return; // as after the link to the arm
     const links = linksIn(location.hash);
     // Settings wait for a click, and bring their arm then.
@@ -58,7 +58,7 @@ function startLinks() {
 /** @param {"course" | "workbench"} view */
 function show(view) {
   const links = linksInLink();
-  if (view === "workbench" && stepIn(location.hash) >= 0) setAddress(location.pathname + location.search + (links && `#${links}`));
+  if (view === "workbench" && stepIn(location.hash) >= 0) goToAddress(`#${links || "workbench"}`);
   set("view", view);
 }
 

@@ -10,4 +10,6 @@ echo "test-python: a fresh environment with $(basename "$wheel")"
 rm -rf "$environment"
 python3 -m venv "$environment"
 "$environment/bin/pip" install --quiet --disable-pip-version-check "$wheel" --requirement tests/requirements.txt
+echo "test-python: the metadata, as PyPI checks it"
+"$environment/bin/python" -m twine check --strict "$wheel"
 "$environment/bin/python" -m pytest --quiet --durations 5 "$@"

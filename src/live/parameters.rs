@@ -39,8 +39,9 @@ impl<const N: usize> ArmRequest<N> for AskParameters<N> {
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
     fn value_of(&self, parameter: Parameter) -> ParameterValue<N> {
-        use ParameterValue::{Number, PerJoint, Text};
+        use ParameterValue::{Number, PerJoint, Text, Unset};
         let (arm, gains) = (self.simulation.arm(), self.simulation.pid().gains());
+        let limits = self.simulation.limits();
         match parameter {
             Parameter::Gravity => Number(arm.gravity()),
             Parameter::Masses => PerJoint(*arm.masses()),
@@ -51,6 +52,9 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             Parameter::Integrator => Text(self.simulation.method().name().to_owned()),
             Parameter::Timestep => Number(self.simulation.timestep()),
             Parameter::ControlPeriod => Number(self.simulation.control_period().period),
+            Parameter::EffortLimit => limits.effort.map_or(Unset, PerJoint),
+            Parameter::AntiWindup => Text(limits.anti_windup.name().to_owned()),
+            Parameter::TrackingTime => Number(limits.tracking_time),
             Parameter::RobotDescription => {
                 let (lengths, masses) = (arm.lengths(), arm.masses());
                 Text(urdf::describe(&joint_names::<N>(), lengths, masses))
@@ -65,6 +69,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             ParameterChange::Gains(ask) => ask.perform(self).rejected,
             ParameterChange::Integrator(ask) => ask.perform(self).rejected,
             ParameterChange::Period(ask) => ask.perform(self).rejected,
+            ParameterChange::Limits(ask) => ask.perform(self).rejected,
         }
     }
 }

@@ -28,6 +28,17 @@ class AloneTest(PageTest):
             page.until(f"window.received[{part}] === '{said}'")
         self.assertEqual(page.complaints, [])
 
+    def test_in_a_frame_of_text_a_first_script_gives_it_a_step_and_settings(self):
+        page = self.visit("about:blank")
+        text = FILE.read_text().replace("<script", "<script>location.hash = '#step=2&links=3&timestep=0.002';</script><script", 1)
+        page.run("""((text) => { const frame = document.createElement("iframe"); frame.width = 1200; frame.height = 800;
+          frame.srcdoc = text; document.body.append(frame); })(%s)""" % json.dumps(text))
+        inside = "document.querySelector('iframe').contentDocument"
+        page.until(f"{inside}.querySelector('#offer')?.textContent.includes('timestep 0.002')", why="the settings are offered")
+        page.until(f"{inside}.querySelector('#course-number').textContent.startsWith('Step 2')")
+        page.until(f"{inside}.querySelector('#links').value === '3'")
+        self.assertEqual(page.complaints, [])
+
     def test_without_a_worker_the_page_itself_runs_the_arm(self):
         page = self.visit("about:blank")
         page.send("Page.addScriptToEvaluateOnNewDocument", {"source": "window.Worker = class { constructor() { throw new Error('forbidden'); } };"})

@@ -23,6 +23,7 @@ mod expression;
 mod goal;
 mod integrators;
 mod kinematics;
+mod limits;
 mod pacer;
 mod particle;
 mod simulation;

@@ -3,7 +3,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { answerInForce, controlPeriodLimit, doublingTime, energyName, factorOf, keepAnswer, limitInForce, motionHasChanged, noGains, periodText, question, scaled, verdict, whyText } from "../../page/policy.js";
+import {
+  answerInForce, controlPeriodLimit, doublingTime, energyName, factorOf, keepAnswer, limitInForce, motionHasChanged, periodText, scaled, verdict, whyText,
+} from "../../page/policy.js";
+import { loopKey, noGains, questionOf } from "../../page/question.js";
 
 const VALUES = {
   timestep_limit_held: 0.0136, timestep_limit_continuous: 0.0204, minimum_over_poses_held: 0.00432,
@@ -13,17 +16,15 @@ const VALUES = {
 function arm(changed = {}) {
   const state = {
     connection: "open", links: 2, enabled: true, setpointKnown: true, setpoint: Float64Array.of(0.9, -1.3, 0),
+    position: new Float64Array(3), velocity: new Float64Array(3),
     integrator: { method: "rk4", timestep: 0.001 }, params: { gravity: 9.81, masses: [1, 1], lengths: [1, 1] },
     gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] }, period: { period: 0, effective_period: 0.001, delay: false }, diagnostics: { state: "running" }, ...changed,
   };
   const { answers = { [state.integrator.method]: changed.stability ?? VALUES }, motions = {} } = changed;
-  return { ...state, limits: { loop: JSON.stringify(question(state)), answers, motions } };
+  const asked = questionOf(state);
+  const broken = state.diagnostics?.state === "diverged" ? asked : null; // the page saw it, and nothing has changed since
+  return { broken, ...state, limits: { loop: asked ? loopKey(asked) : "", answers, motions } };
 }
-
-test("with the controller off the question is about the free arm", () => {
-  assert.deepEqual(question(arm({ enabled: false })).gains, { kp: [0, 0], ki: [0, 0], kd: [0, 0] });
-  assert.deepEqual(question(arm()).gains.kp, [1000, 250]);
-});
 
 test("an answer about another loop is ignored, and gives no button", () => {
   const on = arm({ integrator: { method: "rk4", timestep: 0.01 } });
@@ -32,6 +33,16 @@ test("an answer about another loop is ignored, and gives no button", () => {
   const said = verdict(off);
   assert.equal(said.kind, "unknown");
   assert.ok(Number.isNaN(said.limit) && Number.isNaN(said.advised));
+});
+
+test("an answer without the delay is none for the loop with it, and the other way round", () => {
+  const off = arm();
+  const on = { ...off, period: { ...off.period, delay: true } };
+  assert.ok(answerInForce(off));
+  assert.equal(answerInForce(on), null);
+  keepAnswer(on, { ...questionOf(on), integrator: "rk4" }, { ...VALUES, control_period_limit: 0.002 });
+  assert.equal(controlPeriodLimit(on), 0.002);
+  assert.equal(answerInForce({ ...on, period: off.period }), null);
 });
 
 const ADVISED = 0.8 * VALUES.minimum_over_poses_held;
@@ -95,7 +106,7 @@ test("the motion limits the timestep, not the control period", () => {
   assert.deepEqual([coarse.kind, coarse.slow, coarse.advised < 0.018], ["beyond", false, true]);
   const shaking = sampled(0.2, { stability: { ...TWO_CLOCKS, timestep_limit: 0 } });
   assert.match(limitInForce(shaking).where, /^at the setpoint/, "its speed is that of the shaking");
-  keepAnswer(shaking, shaking.limits.loop, "rk4", TWO_CLOCKS);
+  keepAnswer(shaking, { ...questionOf(shaking), integrator: "rk4" }, TWO_CLOCKS);
   assert.deepEqual(shaking.limits.motions, {});
   const noController = { gains: noGains(2), stability: TWO_CLOCKS };
   assert.deepEqual(verdict(sampled(0.05, noController)), verdict(arm(noController)));
@@ -147,28 +158,42 @@ test("after a divergence the earlier limit of the motion counts, and the advice 
   assert.equal(verdict(unknown).advised, 0.05);
 });
 
+test("a divergence is blamed on the timestep at which it happened, not on a later one", () => {
+  const diverged = { diagnostics: { state: "diverged", message: "" } };
+  const then = arm({ ...at(0.02), ...diverged });
+  const shorter = { ...then, integrator: { method: "rk4", timestep: 0.0001 } };
+  for (const state of [then, shorter]) assert.match(verdict(state).sentence, /^20 ms is above the limit 13\.6 ms/);
+  assert.equal(verdict(then).advised, 0.8 * VALUES.minimum_over_poses_held);
+  assert.ok(Number.isNaN(verdict(shorter).advised), "the arm may restart as it is set now");
+  const softer = { ...shorter, gains: { ...then.gains, kp: [10, 10] } };
+  assert.equal(verdict({ ...softer, limits: arm(softer).limits }).sentence, "Other settings are in force now.");
+  assert.equal(verdict({ ...shorter, broken: null }).sentence, "", "the page has not seen it");
+});
+
 test("the motion's first limit is kept, and none of an arm that has diverged", () => {
   const state = swing("verlet", 0.1, { answers: {} });
-  const { loop } = state.limits;
-  keepAnswer(state, loop, "verlet", FREE);
-  keepAnswer(state, loop, "verlet", { ...FREE, timestep_limit_motion: 0.01 });
+    keepAnswer(state, { ...questionOf(state), integrator: "verlet" }, FREE);
+  keepAnswer(state, { ...questionOf(state), integrator: "verlet" }, { ...FREE, timestep_limit_motion: 0.01 });
   assert.equal(state.limits.motions.verlet.limit, 0.0488);
   state.diagnostics = { state: "diverged" };
-  keepAnswer(state, loop, "rk4", { ...FREE, timestep_limit_motion: 1e-150 });
+  keepAnswer(state, { ...questionOf(state), integrator: "rk4" }, { ...FREE, timestep_limit_motion: 1e-150 });
   assert.equal(state.limits.motions.rk4, undefined);
   const shaking = arm({ integrator: { method: "rk4", timestep: 0.02 } });
-  keepAnswer(shaking, shaking.limits.loop, "rk4", VALUES);
+  keepAnswer(shaking, { ...questionOf(shaking), integrator: "rk4" }, VALUES);
   assert.deepEqual(shaking.limits.motions, {});
-  keepAnswer(state, "another loop", "rk4", FREE);
+  keepAnswer(state, { ...questionOf(state), params: { gravity: 0, masses: [1, 1], lengths: [1, 1] }, integrator: "rk4" }, FREE);
   assert.deepEqual(Object.keys(state.limits.answers), ["rk4"]);
 });
 
 test("a button's limit counts the motion, whatever the method", () => {
   const state = swing("verlet", 0.001, { answers: { verlet: FREE, rk4: { ...FREE, timestep_limit_held: 0.393, timestep_limit: 0.393, timestep_limit_motion: 0.0762 } } });
   assert.deepEqual(["verlet", "rk4", "euler"].map((method) => limitInForce(state, method).limit), [0.0488, 0.0762, NaN]);
-  // Midpoint's free swing gains energy so slowly that the motion is the limit. Euler's does not.
+  // Midpoint's free swing gains energy slowly at short steps. Euler's does not.
   const grows = { ...FREE, timestep_limit_held: 0, timestep_limit: 0 };
-  assert.equal(limitInForce(swing("midpoint", 0.001, { stability: grows })).limit, 0.0488);
+  const midpoint = [1e-6, 0.001, 0.02, 0.1].map((timestep) => limitInForce(swing("midpoint", timestep, { stability: grows })).limit);
+  for (const limit of midpoint) assert.equal(limit, midpoint[0], "no limit depends on the timestep");
+  assert.ok(Math.abs(doublingTime("midpoint", midpoint[0], grows) - 600) < 1e-6 && Math.abs(midpoint[0] - 0.01206) < 1e-5);
+  assert.equal(limitInForce(swing("midpoint", 0.001, { stability: { ...grows, timestep_limit_motion: 0.005 } })).limit, 0.005);
   assert.equal(limitInForce(swing("euler", 0.001, { stability: grows })).limit, 0);
   assert.ok(Math.abs(doublingTime("euler", 0.001, grows) - 13.5) < 0.1);
 });

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { duration, fixed, inPageNames, multipleOf, partOf, plain, short, significant } from "../../page/format.js";
-import { Rosbridge } from "../../page/rosbridge.js";
+import { Rosbridge, socketAddress } from "../../page/rosbridge.js";
 import { Axis, symmetricLog } from "../../page/scale.js";
 import { DEFAULTS, Undo, fromFragment, presentSettings, toFragment } from "../../page/settings.js";
 
@@ -116,6 +116,13 @@ test("a refusal has the names of the page's fields", () => {
     "masses must have 2 entries, got 1": "masses must have 2 entries, got 1",
   };
   for (const [status, text] of Object.entries(shown)) assert.equal(inPageNames(status), text);
+});
+
+test("the WebSocket is in the folder of the page, also behind a proxy", () => {
+  const pages = {
+    "http://127.0.0.1:9095/": "ws://127.0.0.1:9095/", "https://host/arm1/": "wss://host/arm1/", "https://host/arm1/index.html?links=2#step=own": "wss://host/arm1/",
+  };
+  for (const [page, socket] of Object.entries(pages)) assert.equal(socketAddress(page), socket);
 });
 
 test("a request with a number that is not finite is refused, because null can mean the default", async () => {

@@ -10,6 +10,7 @@ from importlib.metadata import version as _version
 
 from . import dynamics
 from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
+from ._page import Page, page
 from .report import read_report
 from .study import Critical, Plan, Rollout, Stability, SuggestedGains, plan, rollout, stability, suggest_gains
 from .sweep import Run, Sweep, sweep
@@ -21,6 +22,7 @@ __all__ = [
     "Batch",
     "Critical",
     "Divergence",
+    "Page",
     "Plan",
     "Rollout",
     "Run",
@@ -32,6 +34,7 @@ __all__ = [
     "dynamics",
     "end_effector",
     "inverse_kinematics",
+    "page",
     "plan",
     "read_report",
     "rollout",

@@ -39,6 +39,7 @@ pub use self::input::{ArmInput, StepNote};
 use super::arm::{Arm, State};
 use super::dynamics::{forward_dynamics, weightless_dynamics};
 use super::integrator::Method;
+use super::limits::Limits;
 use super::pid::{Control, Gains, Pid, Setpoint};
 
 /// Default timestep \[s\]: at most a third of the stability limit of the default gains.
@@ -120,7 +121,7 @@ impl<const N: usize> Simulation<N> {
         Self {
             arm,
             pid: Pid::new(gains),
-            hold: Hold::new(Held::default(), DEFAULT_TIMESTEP),
+            hold: Hold::new(Held::default(), Limits::default(), DEFAULT_TIMESTEP),
             method: Method::Rk4,
             timestep: DEFAULT_TIMESTEP,
             state: State::rest(),
@@ -284,8 +285,8 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// Returns to the starting pose at rest, at time 0. Setpoint and integral are reset, all efforts are zero,
-    /// disturbance and divergence end, and a control period begins. Gains, arm, method, timestep, control period and
-    /// the controller's on/off state do not change.
+    /// disturbance and divergence end, and a control period begins. Gains, arm, method, timestep, control period,
+    /// limits and the controller's on/off state do not change.
     pub fn reset(&mut self) {
         self.set_state(State::rest());
         self.pid.reset();
@@ -311,7 +312,7 @@ impl<const N: usize> Simulation<N> {
         self.divergence = None;
     }
 
-    /// Effort of the latest step \[N m\], the controller's plus the disturbance's. It is zero as soon as the
+    /// Effort of the latest step \[N m\], that of the motors plus the disturbance's. It is zero as soon as the
     /// controller is turned off, and after a reset.
     #[must_use]
     pub fn effort(&self) -> &[f64; N] {
@@ -403,6 +404,24 @@ impl<const N: usize> Simulation<N> {
     pub fn drive(&mut self, effort: Option<[f64; N]>) {
         let change = |held: &mut Held<N>| held.driven = effort;
         self.hold.begin_period(self.timestep, change);
+    }
+
+    /// The limits of the motors.
+    #[must_use]
+    pub fn limits(&self) -> &Limits<N> {
+        &self.hold.limits
+    }
+
+    /// Changes the limits of the motors from the next step on. The integral and the control period go on. Each limit
+    /// must be finite and not negative, and the tracking time greater than 0.
+    pub fn set_limits(&mut self, limits: Limits<N>) {
+        self.hold.set_limits(limits, self.timestep);
+    }
+
+    /// The joints whose motor was at its limit in the latest step. A joint without a motor is not among them.
+    #[must_use]
+    pub fn at_limit(&self) -> [bool; N] {
+        self.hold.at_limit(self.pid.is_enabled())
     }
 
     /// Changes the gains and keeps the integral.

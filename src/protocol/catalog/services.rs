@@ -102,6 +102,10 @@ table! {
         SetPeriod = changes("/pid_controller/set_period", "pendularm_interfaces/srv/SetPeriod")
             .request(fields!["float64 period?  # s", "bool delay?"])
             .response(fields!["float64 period  # s", "float64 effective_period  # s", "bool delay"]),
+        /// The limits of the motors, and the anti-windup.
+        SetLimits = changes("/pid_controller/set_limits", "pendularm_interfaces/srv/SetLimits")
+            .request(LIMITS)
+            .response(LIMITS),
         /// Joint positions for an end effector position.
         Solve = service("/ik/solve", "pendularm_interfaces/srv/Solve", Node::Ik)
             .request(fields!["float64 x  # m", "float64 y  # m", "float64 phi?  # rad"])
@@ -277,6 +281,11 @@ const fn changes(name: &'static str, type_name: &'static str) -> ServiceEntry {
 
 const METHOD: &[Field] = fields!["string method?", "float64 timestep?  # s",];
 const STATE: &[Field] = fields!["float64[] position  # rad", "float64[] velocity  # rad/s",];
+const LIMITS: &[Field] = fields![
+    "float64[] effort?  # N m",
+    "string anti_windup?",
+    "float64 tracking_time?  # s",
+];
 const NAMES: &[Field] = fields!["string[] names"];
 const SWITCH: &[Field] = fields!["bool data?"];
 const DISTURBANCE: &[Field] = fields!["float64[] effort  # N m", "float64 duration  # s",];

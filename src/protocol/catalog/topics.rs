@@ -216,6 +216,7 @@ mod tests {
                 "/arm_sim/step",
                 "/pid_controller/enable",
                 "/pid_controller/set_gains",
+                "/pid_controller/set_limits",
                 "/pid_controller/set_period",
                 "/rosapi/set_param",
             ]

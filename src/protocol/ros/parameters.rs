@@ -32,6 +32,15 @@ table! {
             name: "control_period",
             ..field_of(Service::SetPeriod, "period")
         },
+        /// The largest efforts of the motors \[N m\]; without entries for no limit.
+        EffortLimit = ParameterEntry {
+            name: "effort_limit",
+            ..field_of(Service::SetLimits, "effort")
+        },
+        /// What the integral does while an effort is at its limit.
+        AntiWindup = field_of(Service::SetLimits, "anti_windup"),
+        /// The tracking time of the back calculation \[s\].
+        TrackingTime = field_of(Service::SetLimits, "tracking_time"),
         /// The arm as URDF, computed from lengths and masses; read only.
         RobotDescription = ParameterEntry { name: "robot_description", field: None },
     }

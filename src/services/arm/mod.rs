@@ -8,6 +8,7 @@
 mod disturb;
 mod gains;
 mod integrator;
+mod limits;
 mod messages;
 mod parameters;
 mod period;
@@ -22,6 +23,7 @@ pub(crate) use self::disturb::DIVERGED;
 pub use self::disturb::{Disturb, Push};
 pub use self::gains::SetGains;
 pub use self::integrator::{Integrator, SetIntegrator};
+pub use self::limits::SetLimits;
 pub use self::messages::{joint_names, read_effort};
 pub use self::parameters::{
     AskParameters, NamedParameter, NotSet, ParameterChange, ParameterRequest, ParameterValue,

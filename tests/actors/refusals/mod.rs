@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 const WITHOUT_ROWS: &str = "name";
 
 /// Services that apply each field separately, with valid values that differ from the present ones.
-const FIELD_BY_FIELD: [(&str, &str); 7] = [
+const FIELD_BY_FIELD: [(&str, &str); 8] = [
     (
         "/arm_sim/set_integrator",
         r#"{"method":"euler","timestep":0.002}"#,
@@ -36,6 +36,10 @@ const FIELD_BY_FIELD: [(&str, &str); 7] = [
     (
         "/pid_controller/set_period",
         r#"{"period":0.02,"delay":true}"#,
+    ),
+    (
+        "/pid_controller/set_limits",
+        r#"{"effort":[25.0,10.0],"anti_windup":"conditional","tracking_time":0.5}"#,
     ),
 ];
 

@@ -57,7 +57,7 @@ const PROTOCOL: [(&str, &[&str]); 8] = [
     ("wire", &["limits", "catalog"]),
     ("messages", &["wire"]),
     ("op", &["limits", "catalog", "wire", "messages"]),
-    ("outbox", &["limits", "wire"]),
+    ("outbox", &["catalog", "limits", "wire"]),
     ("ros", &["names", "catalog", "messages", "wire"]),
 ];
 

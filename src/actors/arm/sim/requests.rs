@@ -14,8 +14,8 @@ use crate::actors::node::{Call, Nodes, ShutDown, Unserved};
 use crate::live::ArmRequest;
 use crate::protocol::catalog::{Node, Rosapi, Service, Topic};
 use crate::services::arm::{
-    AskParameters, Disturb, Enable, GetTime, Pause, Reset, SetGains, SetIntegrator, SetParams,
-    SetPeriod, SetState, Step, parameter_services,
+    AskParameters, Disturb, Enable, GetTime, Pause, Reset, SetGains, SetIntegrator, SetLimits,
+    SetParams, SetPeriod, SetState, Step, parameter_services,
 };
 use crate::services::goals::Solve;
 
@@ -27,6 +27,7 @@ impl<const N: usize> ArmSim<N> {
         nodes.serve::<SetGains<N>>(Service::SetGains, address.clone());
         nodes.serve::<SetIntegrator>(Service::SetIntegrator, address.clone());
         nodes.serve::<SetParams<N>>(Service::SetParams, address.clone());
+        nodes.serve::<SetLimits<N>>(Service::SetLimits, address.clone());
         nodes.serve::<SetPeriod>(Service::SetPeriod, address.clone());
         nodes.serve::<Reset<N>>(Service::Reset, address.clone());
         nodes.serve::<SetState<N>>(Service::SetState, address.clone());
