@@ -50,7 +50,7 @@ test: ## Run every test that needs only Rust, except slow ones
 
 conformance: ## Test any server of the protocol against the specification's rules: ADDR=127.0.0.1:9095; ARGS="--category pid" or "--rule reset"
 	@echo "make conformance: one line per rule, about 40 s; exit status 0 if every rule holds"
-	@$(CARGO) run --quiet --locked -p pendularm-conformance -- "$(or $(ADDR),127.0.0.1:9095)" $(ARGS)
+	@$(CARGO) run --quiet --locked -- conformance "$(or $(ADDR),127.0.0.1:9095)" $(ARGS)
 
 check-study: ## Check the study on COUNT=10000 random arms, gains, poses and setpoints; FROM=n begins at case n; PROFILE=dev uses the tests' build
 	@echo "make check-study: an optimised build, then some minutes per 10000 cases"

@@ -16,6 +16,7 @@
 //! | `report` | yes | `report`, with its experiments |
 //! | `record` | yes | `record`: records of runs, written, read and replayed |
 //! | `cli` | yes | `command`: commands for a running pendularm, completions; `score` |
+//! | `conformance` | yes | `referee`: the rules of the specification against any server |
 //!
 //! Without default features the library is [`math`] and [`study`], which is enough to step arms. Its dependencies
 //! are then `glam`, `libm` and `thiserror`. With `batch`, and `fearless_simd`, a free step of Runge-Kutta 4 on x86-64
@@ -56,6 +57,8 @@ pub mod plan;
 pub mod protocol;
 #[cfg(feature = "record")]
 pub mod record;
+#[cfg(feature = "conformance")]
+pub mod referee;
 #[cfg(feature = "report")]
 pub mod report;
 #[cfg(feature = "cli")]

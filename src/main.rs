@@ -29,6 +29,8 @@ use pendularm::output::{self, print_error};
 use pendularm::plan;
 #[cfg(feature = "record")]
 use pendularm::record;
+#[cfg(feature = "conformance")]
+use pendularm::referee;
 #[cfg(feature = "report")]
 use pendularm::report;
 #[cfg(feature = "cli")]
@@ -66,6 +68,8 @@ fn main() -> ExitCode {
         Ok(Parsed::Score { files }) => score(&files),
         #[cfg(feature = "cli")]
         Ok(Parsed::Ask(subject)) => end(command::run(&subject)),
+        #[cfg(feature = "conformance")]
+        Ok(Parsed::Conformance(options)) => ExitCode::from(referee::run(&options)),
         #[cfg(feature = "cli")]
         Ok(Parsed::Completions { shell }) => show(&completions(shell)),
         Ok(Parsed::Show(text)) => show(&text),

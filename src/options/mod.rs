@@ -25,6 +25,8 @@ use crate::logging::LogFormat;
 use crate::plan::PlanOptions;
 pub use crate::protocol::limits::{DEFAULT_CLIENTS, MAX_CLIENTS};
 use crate::protocol::op::token::Token;
+#[cfg(feature = "conformance")]
+use crate::referee::ConformanceOptions;
 #[cfg(feature = "report")]
 use crate::report::ReportOptions;
 pub use crate::value::Links;
@@ -151,6 +153,9 @@ pub enum Parsed {
         #[arg(required = true)]
         files: Vec<PathBuf>,
     },
+    /// Test any server of the protocol against the rules of the specification
+    #[cfg(feature = "conformance")]
+    Conformance(Box<ConformanceOptions>),
     /// A command for a running pendularm.
     #[cfg(feature = "cli")]
     #[command(flatten)]

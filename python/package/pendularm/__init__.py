@@ -10,6 +10,7 @@ from importlib.metadata import version as _version
 
 from . import dynamics
 from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
+from .held import HeldLimit, HeldMode, held_limit
 from ._page import Page, page
 from ._ray import RayExecutor
 from .report import read_report
@@ -24,6 +25,8 @@ __all__ = [
     "Batch",
     "Critical",
     "Divergence",
+    "HeldLimit",
+    "HeldMode",
     "Page",
     "Plan",
     "RayExecutor",
@@ -36,6 +39,7 @@ __all__ = [
     "default_gains",
     "dynamics",
     "end_effector",
+    "held_limit",
     "inverse_kinematics",
     "page",
     "plan",

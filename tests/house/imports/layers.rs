@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::arrows::{PENDULARM, SourceTree};
 
 /// Layers that a layer may import, besides itself. A row names only rows above it.
-const LAYERS: [(&str, &[&str]); 20] = [
+const LAYERS: [(&str, &[&str]); 21] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
@@ -25,10 +25,12 @@ const LAYERS: [(&str, &[&str]); 20] = [
     ),
     ("plan", &["math", "study", "value"]),
     ("score", &["math"]),
+    ("referee", &["output", "value", "signals"]),
     (
         "options",
         &[
             "protocol", "web", "report", "command", "logging", "address", "value", "plan",
+            "referee",
         ],
     ),
     (
@@ -43,7 +45,7 @@ const LAYERS: [(&str, &[&str]); 20] = [
         "main",
         &[
             "command", "logging", "output", "record", "report", "options", "plan", "score",
-            "actors", "signals",
+            "actors", "signals", "referee",
         ],
     ),
 ];

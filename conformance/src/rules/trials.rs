@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::Check;
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY};
-use crate::peer::PATIENCE;
+use crate::run::PATIENCE;
 use crate::values::{boolean, member, must, near, number, numbers_of, text};
 
 /// The checks of this part.

@@ -17,8 +17,13 @@ pub const CHECKS: &[Check] = &[
     ("enable-1", |bench| {
         let found = bench.found()?.clone();
         let data = crate::values::boolean(&found.setting(ENABLE)?, "data")?;
+        let state = found.state?;
+        let away = largest(&minus(&state.position, &bench.reset()?));
+        if data && largest(&state.effort) > 0.0 && away > 0.1 {
+            return bench.aside("PID is on and moved the arm, so somebody has used this server; a fresh server can be judged");
+        }
         must(!data, || "data true".to_owned())?;
-        let effort = found.state?.effort;
+        let effort = state.effort;
         near("effort", &effort, &bench.each(0.0), 1e-12)?;
         Ok(format!("data false, effort {}", list(&effort)))
     }),

@@ -3,7 +3,7 @@
 //! The setpoint shows in the effort: without gravity and with small gains the arm hardly moves, so `effort / kp` is the
 //! position error, and `effort / kd` the velocity error.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::json;
 
@@ -94,6 +94,17 @@ pub const CHECKS: &[Check] = &[
         must(largest(&[last]).is_finite(), || "no stamp".to_owned())?;
         Ok(format!("15 stamps, the last {last:.3} s"))
     }),
+    ("pace-1", |bench| {
+        paced(bench, 1.0, 0.05, "stamps advance by", "s in a second", |states| {
+            let (first, last) = (states.first()?, states.last()?);
+            Some(last.stamp - first.stamp)
+        })
+    }),
+    ("pace-2", |bench| {
+        #[allow(clippy::cast_precision_loss, reason = "a second has few messages")]
+        let count = |states: &[Joints]| Some(states.len().saturating_sub(1) as f64);
+        paced(bench, 60.0, 0.2, "at", "Hz", count)
+    }),
 ];
 
 /// Passes if the effort shows these angles as the setpoint of the positions.
@@ -130,4 +141,24 @@ fn stays(bench: &mut Bench, points: &serde_json::Value) -> Got {
     bench.command(&json!([point(&angles, &bench.each(0.0))]))?;
     bench.command(points)?;
     position_is(bench, &angles)
+}
+
+/// Passes if the rate of a quantity is the expected one in one of three seconds: a busy machine may delay messages.
+fn paced(bench: &mut Bench, expected: f64, tolerance: f64, says: &str, unit: &str, quantity: fn(&[Joints]) -> Option<f64>) -> Got {
+    let mut got = String::new();
+    for _ in 0..3 {
+        bench.fresh()?;
+        let (began, mut states) = (Instant::now(), vec![bench.joints()?]);
+        let first = began.elapsed();
+        while began.elapsed() < Duration::from_secs(1) {
+            states.push(bench.joints()?);
+        }
+        let seconds = (began.elapsed() - first).as_secs_f64();
+        let rate = quantity(&states).ok_or("no joint states")? / seconds;
+        got = format!("{says} {rate:.2} {unit}");
+        if (rate / expected - 1.0).abs() <= tolerance {
+            return Ok(got);
+        }
+    }
+    Err(got)
 }

@@ -5,8 +5,8 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use crate::Check;
+use crate::peer::is_response_to;
 use crate::values::{member, must, text};
-use pendularm_client::is_response_to;
 
 /// The checks of this part.
 pub const CHECKS: &[Check] = &[
@@ -14,7 +14,7 @@ pub const CHECKS: &[Check] = &[
         let answer = bench.peer.call("/arm_sim/set_params", &json!({}))?;
         let service = text(&answer.frame, "service")?;
         must(service == "/arm_sim/set_params", || format!("service {service}"))?;
-        let id = member(&answer.frame, "id")?.clone();
+        let id = answer.has_id()?.clone();
         bench.peer.call("/arm_sim/pause", &json!({}))?;
         let second = bench.peer.find(std::time::Instant::now() + Duration::from_millis(100), |frame| is_response_to(frame, &id));
         must(second.is_err(), || "a second response".to_owned())?;
@@ -38,6 +38,7 @@ pub const CHECKS: &[Check] = &[
     }),
     ("envelope-3", |bench| {
         let answer = bench.rejected("/arm_sim/set_params", &json!({"gravity": -1}))?;
+        answer.has_id()?;
         must(member(&answer.frame, "values")?.is_object(), || "values is no object".to_owned())?;
         Ok(answer.status)
     }),

@@ -5,6 +5,7 @@
 //!
 //! The known state: running, PID off, `rk4` at 1 ms, gravity 9.81, links of 1 m and 1 kg, no goal, no trial, just reset.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -12,7 +13,8 @@ use serde_json::{Value, json};
 use crate::Got;
 use crate::arm::{Arm, State};
 use crate::method::step;
-use crate::peer::{Answer, PATIENCE, Peer, Trouble, is_message};
+use crate::peer::{Answer, Peer, Trouble, is_message};
+use crate::run::Run;
 use crate::values::{largest, list, minus, must, near, number, numbers, numbers_of, set, text};
 
 /// Standard gravity of the specification.
@@ -40,10 +42,12 @@ const ENDING: [&str; 3] = ["/ik_trial/stop", "/ik_action/cancel_goal", "/arm_sim
 
 impl Found {
     /// Asks the server at an address.
-    pub fn at(address: &str) -> Result<Self, String> {
-        let mut bench = Bench { peer: Peer::connect(address)?, links: 0, found: None };
+    pub fn at(address: &str, run: &Arc<Run>) -> Result<Self, String> {
+        let mut bench = Bench { peer: Peer::connect(address, run)?, links: 0, found: None, is_aside: false };
+        greet(&mut bench.peer, address)?;
         let params = bench.accepted("/arm_sim/set_params", &json!({}));
-        let state = bench.watch("/joint_states").and_then(|()| bench.message("/joint_states", PATIENCE)).and_then(|msg| Joints::read(&msg));
+        let patience = run.patience;
+        let state = bench.watch("/joint_states").and_then(|()| bench.message("/joint_states", patience)).and_then(|msg| Joints::read(&msg));
         let by_params = params.as_ref().ok().and_then(|values| numbers(values, "masses").ok()).map(|masses| masses.len());
         let links = by_params.or_else(|| state.as_ref().ok().map(|state| state.position.len()));
         let links = match links {
@@ -71,18 +75,55 @@ impl Found {
         found.map_or_else(|| Err(format!("{service} has not been asked")), |(_, values)| values.clone())
     }
 
-    /// Restores the server's settings, as far as it accepts them.
-    pub fn restore(&self, address: &str) {
-        let Ok(mut bench) = Bench::prepared(address, self) else {
-            return;
+    /// Restores the server's settings. Returns what the server did not take back.
+    pub fn restore(&self, address: &str) -> Vec<String> {
+        // A run of its own, because the other one may have been interrupted.
+        let mut bench = match Bench::prepared(address, self, &Arc::default()) {
+            Ok(bench) => bench,
+            Err(why) => return vec![format!("the settings are not restored: {why}")],
         };
+        let mut missed = Vec::new();
         for (service, values) in SETTINGS.iter().zip(&self.settings) {
-            if let Ok(values) = values {
-                // A server that refuses has failed its rule already.
-                let _ = bench.peer.call(service, values);
+            let Ok(values) = values else { continue };
+            let answer = bench.peer.call(service, values);
+            if let Err(why) = answer.and_then(|answer| has(values, &answer.values)) {
+                missed.push(format!("{service} is not restored: {why}"));
             }
         }
+        missed
     }
+}
+
+/// Passes if something at the address answers a call as a rosbridge server does.
+fn greet(peer: &mut Peer, address: &str) -> Result<(), String> {
+    let not = |what: &str| Err(format!("{address} is no rosbridge server: {what}"));
+    let is_answer = |frame: &Value| ["service_response", "status"].contains(&frame.get("op").and_then(Value::as_str).unwrap_or_default());
+    // A server of the checkpoint may have the second service alone.
+    for service in ["/arm_sim/set_params", "/arm_sim/integration_step"] {
+        // Calls are counted from 1, so a later answer is none to another call.
+        let greeting = json!({"op": "call_service", "service": service, "args": {}, "id": "call-0"});
+        if let Err(why) = peer.send(&greeting) {
+            return not(&why);
+        }
+        match peer.find(Instant::now() + GREETING.min(peer.run.patience), is_answer) {
+            Ok(_) => return Ok(()),
+            Err(Trouble::Silence) => {}
+            Err(Trouble::Broken(why)) if why.contains("HTTP/") => return not("it speaks HTTP"),
+            Err(Trouble::Broken(why)) if why.contains("TLS") => return not("it speaks TLS"),
+            Err(Trouble::Broken(why)) => return not(&why),
+        }
+    }
+    not(if speaks_http(address) { "it speaks HTTP" } else { "it gave no answer to a call" })
+}
+
+/// The longest wait for the first answer to each of two calls. A verdict on an address takes at most 5 s.
+const GREETING: Duration = Duration::from_millis(1500);
+
+/// Whether a server answers a request of HTTP.
+fn speaks_http(address: &str) -> bool {
+    let Ok(mut peer) = Peer::connect(address, &Arc::default()) else { return false };
+    let is_sent = peer.send_line("GET / HTTP/1.0\r\n\r").is_ok();
+    is_sent && matches!(peer.receive(Instant::now() + Duration::from_secs(1)), Err(Trouble::Broken(why)) if why.contains("HTTP/"))
 }
 
 /// A message on `/joint_states`.
@@ -131,13 +172,15 @@ pub struct Bench {
     /// How many links the arm has.
     pub links: usize,
     found: Option<Found>,
+    /// Whether the present rule cannot be judged at this server.
+    pub is_aside: bool,
 }
 
 impl Bench {
     /// Connects and puts the arm into the known state.
-    pub fn prepared(address: &str, found: &Found) -> Result<Self, String> {
+    pub fn prepared(address: &str, found: &Found, run: &Arc<Run>) -> Result<Self, String> {
         let links = found.links;
-        let mut bench = Self { peer: Peer::connect(address)?, links, found: Some(found.clone()) };
+        let mut bench = Self { peer: Peer::connect(address, run)?, links, found: Some(found.clone()), is_aside: false };
         let arm = Arm::of(links, GRAVITY);
         let calls = [
             (ENDING[0], json!({})),
@@ -158,7 +201,7 @@ impl Bench {
     /// A second connection, to the same server; it changes nothing.
     pub fn another(&self) -> Result<Self, String> {
         let address = self.peer.address()?;
-        Ok(Self { peer: Peer::connect(&address)?, links: self.links, found: self.found.clone() })
+        Ok(Self { peer: Peer::connect(&address, &self.peer.run)?, links: self.links, found: self.found.clone(), is_aside: false })
     }
 
     /// The server's answers before anything was changed.
@@ -168,13 +211,51 @@ impl Bench {
 
     /// The values of an accepted call.
     pub fn accepted(&mut self, service: &str, args: &Value) -> Result<Value, String> {
-        let Answer { values, result, status, .. } = self.peer.call(service, args)?;
+        let answer = self.peer.call(service, args).inspect_err(|_| self.peer.run.refused(service))?;
+        let Answer { values, result, status, .. } = answer;
+        if result {
+            self.peer.run.accepted(service)
+        } else {
+            self.peer.run.refused(service)
+        }
         must(result, || format!("{service} {args} is rejected: {status}"))?;
         Ok(values)
     }
 
+    /// Passes if the service has accepted a call in this run. A service that does not exist rejects every call.
+    pub fn exists(&mut self, service: &str) -> Result<(), String> {
+        if self.peer.run.accepts(service) {
+            return Ok(());
+        }
+        let arm = self.arm().unwrap_or_else(|_| Arm::of(self.links, GRAVITY));
+        let pose: Vec<f64> = [0.5, -0.8, 0.4].into_iter().take(self.links).collect();
+        let (x, y, phi) = arm.end_effector(&pose);
+        let goal = json!({"x": x, "y": y, "phi": phi});
+        let step = json!({"function": "t", "x0": 0.0, "xdot0": 0.0, "dt": 0.1, "steps": 3, "integrator": "rk4"});
+        let calls: &[(&str, Value)] = match service {
+            "/arm_sim/integration_step" => &[(service, step)],
+            "/ik/solve" => &[(service, goal)],
+            "/ik_action/send_goal" => &[(service, goal), ("/ik_action/cancel_goal", json!({}))],
+            "/ik_action/cancel_goal" => &[("/ik_action/send_goal", goal), (service, json!({}))],
+            "/ik_trial/skip" => &[("/ik_trial/start", json!({})), (service, json!({})), ("/ik_trial/stop", json!({}))],
+            "/ik_trial/stop" => &[("/ik_trial/start", json!({})), (service, json!({}))],
+            _ => &[(service, json!({}))],
+        };
+        for (name, args) in calls {
+            self.accepted(name, args).map_err(|why| format!("a rejection counts once a valid call is accepted: {why}"))?;
+        }
+        Ok(())
+    }
+
+    /// The rule cannot be judged at this server: it counts neither for nor against it.
+    pub fn aside(&mut self, why: &str) -> Got {
+        self.is_aside = true;
+        Err(why.to_owned())
+    }
+
     /// The answer to a call that must be rejected with a reason.
     pub fn rejected(&mut self, service: &str, args: &Value) -> Result<Answer, String> {
+        self.exists(service)?;
         let answer = self.peer.call(service, args)?;
         must(!answer.result, || format!("{service} {args} is accepted"))?;
         must(!answer.status.is_empty(), || format!("{service} {args} is rejected with an empty status"))?;
@@ -204,7 +285,16 @@ impl Bench {
     /// The next expected message on a topic. Others are kept.
     pub fn message_that(&mut self, topic: &str, within: Duration, name: &str, is_it: impl Fn(&Value) -> bool) -> Result<Value, String> {
         let holds = |frame: &Value| is_message(frame, topic) && frame.get("msg").is_some_and(&is_it);
-        match self.peer.find(Instant::now() + within, holds) {
+        // The one topic that is never silent.
+        let is_states = topic == "/joint_states";
+        let within = if is_states { within.min(self.peer.run.patience_for(topic)) } else { within };
+        let found = self.peer.find(Instant::now() + within, holds);
+        match (&found, is_states) {
+            (Ok(_), true) => self.peer.run.spoke(topic),
+            (Err(Trouble::Silence), true) => self.peer.run.was_silent(topic),
+            _ => {}
+        }
+        match found {
             Ok(mut frame) => Ok(frame.get_mut("msg").map(Value::take).unwrap_or_default()),
             Err(Trouble::Silence) => Err(format!("{name} did not come on {topic} within {:.1} s", within.as_secs_f64())),
             Err(Trouble::Broken(why)) => Err(why),
@@ -231,7 +321,7 @@ impl Bench {
 
     /// The next joint states, in order.
     pub fn joints(&mut self) -> Result<Joints, String> {
-        let msg = self.message("/joint_states", PATIENCE)?;
+        let msg = self.message("/joint_states", self.peer.run.patience)?;
         let joints = Joints::read(&msg)?;
         let lengths = [joints.position.len(), joints.velocity.len(), joints.effort.len()];
         must(lengths == [self.links; 3], || format!("position, velocity and effort have {lengths:?} entries for {} joints", self.links))?;
@@ -338,7 +428,8 @@ impl Bench {
     /// Sends points of a trajectory.
     pub fn command(&mut self, points: &Value) -> Result<(), String> {
         let names: Vec<String> = (1..=self.links).map(|joint| format!("joint{joint}")).collect();
-        let header = json!({"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""});
+        // The name tells this trajectory from those of other programs.
+        let header = json!({"stamp": {"sec": 0, "nanosec": 0}, "frame_id": self.peer.run.name});
         self.peer.send(&json!({"op": "advertise", "topic": "/joint_trajectory", "type": "trajectory_msgs/msg/JointTrajectory"}))?;
         let msg = json!({"header": header, "joint_names": names, "points": points});
         self.peer.send(&json!({"op": "publish", "topic": "/joint_trajectory", "msg": msg}))

@@ -35,12 +35,12 @@ pub fn step(method: &str, state: &State, t: f64, dt: f64, f: impl Fn(f64, &[f64]
 }
 
 /// `left + factor right`.
-fn plus(left: &[f64], factor: f64, right: &[f64]) -> Vec<f64> {
+pub(crate) fn plus(left: &[f64], factor: f64, right: &[f64]) -> Vec<f64> {
     left.iter().zip(right).map(|(left, right)| left + factor * right).collect()
 }
 
 /// The weights 1:2:2:1.
-fn blend(one: &[f64], two: &[f64], three: &[f64], four: &[f64]) -> Vec<f64> {
+pub(crate) fn blend(one: &[f64], two: &[f64], three: &[f64], four: &[f64]) -> Vec<f64> {
     let inner = plus(two, 1.0, three);
     let outer = plus(one, 1.0, four);
     plus(&outer, 2.0, &inner).iter().map(|sum| sum / 6.0).collect()

@@ -122,7 +122,7 @@ impl Arm {
 }
 
 /// Gauss elimination of rows whose last entry is the right side; the matrix is positive definite, so no row is exchanged.
-fn solved(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
+pub(crate) fn solved(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
     let count = rows.len();
     for pivot in 0..count {
         let above = rows[pivot].clone();

@@ -68,6 +68,7 @@ pub const CHECKS: &[Check] = &[
         Ok(bench.rejected(CANCEL, &json!({}))?.status)
     }),
     ("goal-9", |bench| {
+        bench.exists(CANCEL)?;
         let (_, id) = active(bench)?;
         let status = bench.rejected(CANCEL, &json!({"goal_id": format!("not-{id}")}))?.status;
         no_result(bench, &id)?;
