@@ -206,7 +206,7 @@ impl Reader<'_> {
             integral,
             enabled,
             held,
-            // The library does not set limits.
+            // The library sets neither limits nor friction.
             limits: Limits::default(),
             method,
             timestep,
