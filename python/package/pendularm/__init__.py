@@ -10,8 +10,8 @@ from importlib.metadata import version as _version
 
 from . import dynamics
 from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
-from .held import HeldLimit, HeldMode, held_limit
 from ._page import Page, page
+from .held import HeldLimit, HeldMode, held_limit
 from .report import read_report
 from .study import Critical, Plan, Rollout, Stability, SuggestedGains, plan, rollout, stability, suggest_gains
 from .sweep import Run, Sweep, sweep
