@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build install run page site test conformance check-study test-page test-browser test-clients simulate fuzz attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
+.PHONY: help build install run page site test conformance check-study test-page test-browser test-clients simulate fuzz attack lint audit doc report mutants picture features wheel test-python test-learning ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -129,6 +129,9 @@ wheel: $(if $(PORTABLE),,build) ## Build the Python wheel with the program into 
 
 test-python: wheel ## Install the wheel into a fresh virtual environment and test it there; ARGS="-k batch" selects tests
 	@bash scripts/test-python.sh $(ARGS)
+
+test-learning: wheel ## Test the adapters to stable-baselines3 and Ray; installs both, and torch, which needs some 6 GB
+	@bash scripts/test-python.sh --learning $(ARGS)
 
 ros2: ## Connect a running arm to a ROS 2 graph on Zenoh; ARGS="--connect 127.0.0.1:9095 --domain 0 --namespace /left"; PROFILE=dev uses the tests' build
 	@echo "make ros2: a build of some minutes the first time; then in the foreground until SIGINT"

@@ -25,7 +25,8 @@ const SECONDS = 5; // default duration
 /** Smaller errors are rounding [rad]. */
 const SMALLEST = 1e-13;
 const ROOM = { left: 50 };
-const COLUMNS = /** @type {const} */ ([["outcome", "outcome"], ["energy", "energy gained"], ["error", "largest error"], ["evaluations", "evaluations"], ["time", "run time"]]);
+const COLUMNS = /** @type {const} */ ([["outcome", "outcome"], ["energy", "energy gained"], ["error", "largest error"], ["evaluations", "evaluations"],
+  ["time", "run time"]]);
 
 const x = new Float64Array(MOST_LINKS + 1);
 const y = new Float64Array(MOST_LINKS + 1);
@@ -36,7 +37,10 @@ const from = option({ label: "start", choices: [["now", "as it is"], ["rest", "s
 const controller = option({ label: "controller", choices: [["off", "off"], ["on", "on"]] });
 let said;
 let surfaces = /** @type {Surface[]} */ ([]);
-/** The shown runs, with the reference last. @type {{color: string, away: (number | null)[] | null, times: number[], energy: number[], poses: (number[] | null)[], trail: (number[] | null)[], last: number}[]} */
+/**
+ * The shown runs, with the reference last. @type {{color: string, away: (number | null)[] | null, times: number[], energy:
+ * number[], poses: (number[] | null)[], trail: (number[] | null)[], last: number}[]}
+ */
 let runs = [];
 let instants = /** @type {number[]} */ ([]); // of the reference's samples [s]
 let lengths = /** @type {number[]} */ ([]);
@@ -45,7 +49,8 @@ let playing = false;
 let began = 0; // the clock at the first sample [ms]
 
 export function startCompare() {
-  said = panel(byId("compare-form"), [timestep, seconds, from, controller], [["Compare", () => busy(said.buttons[0], "Computing…", compare), { type: "submit", class: "primary" }]]);
+  said = panel(byId("compare-form"), [timestep, seconds, from, controller],
+    [["Compare", () => busy(said.buttons[0], "Computing…", compare), { type: "submit", class: "primary" }]]);
   const pictures = /** @type {[string, (surface: Surface) => void][]} */ ([
     ["arm", drawArms],
     ["chart", (surface) => drawLines(surface, () => instants, ({ away }) => away ?? [], errorScale())],
@@ -112,9 +117,11 @@ function tracked({ times: own, positions, energy }, n) {
 
 function showTable(found, away, reference, lasted) {
   const lines = found.map((run, i) => describeRun(run, away[i], lasted));
-  fillTable(byId("compare-table"), ["method", ...COLUMNS.map(([, name]) => name)], lines.map((line, i) => [[line.name, `method${i + 1}`], ...COLUMNS.map(([key]) => line[key])]));
+  fillTable(byId("compare-table"), ["method", ...COLUMNS.map(([, name]) => name)],
+    lines.map((line, i) => [[line.name, `method${i + 1}`], ...COLUMNS.map(([key]) => line[key])]));
   const ended = endOf(reference.times, lasted, reference.timestep);
-  const text = `At ${duration(found[0].timestep)}, against Runge–Kutta 4 at ${duration(reference.timestep)}, for ${duration(lasted)}.${ended === null ? "" : ` The reference diverged after t = ${fixed(ended, 2)} s, so no error is known.`}`;
+  const text = `At ${duration(found[0].timestep)}, against Runge–Kutta 4 at ${duration(reference.timestep)}, for `
+    + `${duration(lasted)}.${ended === null ? "" : ` The reference diverged after t = ${fixed(ended, 2)} s, so no error is known.`}`;
   setText(byId("compare-text"), text);
   announce(text);
 }

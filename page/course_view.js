@@ -3,11 +3,11 @@
 // file the arm belongs to the page, so the step begins at once.
 
 import { beginAnew, remember, setScene } from "./actions.js";
-import { Chart, drawBars, drawErrors, drawMap, drawPicture, ROOMY } from "./chart.js";
-import { followEnergy, KEPT, ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
-import { announce, byId, el, goToAddress, passFocus, setAddress, setAttribute, setText } from "./dom.js";
+import { Chart, drawBars, drawErrors, drawMap, drawPicture, drawResponses, ROOMY } from "./chart.js";
+import { followEnergy, KEPT, ofLimit, nothingSeen, shrinks, SOFT, stepIn, STEPS, stepsIn, WEAK } from "./course.js";
+import { announce, byId, el, goToAddress, keepChoice, passFocus, remembered, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
-import { duration, fixed, inPageNames, METHODS, multipleOf, partOf, seconds, shortName } from "./format.js";
+import { duration, fixed, inPageNames, METHODS, multipleOf, partOf, seconds, shortName, significant } from "./format.js";
 import { ENERGY, newest, record, VELOCITY } from "./history.js";
 import { moveOf, rungs } from "./ladder.js";
 import { drawLadder, keyOf, presentMove } from "./ladder_panel.js";
@@ -16,7 +16,9 @@ import { latestOnly } from "./latest.js";
 import { drawMotions, FAILING, motionOf, motionsOf } from "./motions.js";
 import { controlPeriodLimit, verdict } from "./policy.js";
 import { fromRest, questionOf, stepsPerUpdate } from "./question.js";
-import { rollout, setGains, setIntegrator, setParams, setPeriod, setState, step as stepArm } from "./runtime.js";
+import { connectionText } from "./readouts.js";
+import { pause, rollout, setGains, setIntegrator, setMotors, setParams, setPeriod, setState, step as stepArm } from "./runtime.js";
+import { judge, keep as keepResponse, LASTS, nameOf, present, shown } from "./responses.js";
 import { LogScale } from "./scale.js";
 import { SCENES, settingsOf } from "./scenes.js";
 import { DEFAULTS, fromFragment, hasSettings } from "./settings.js";
@@ -25,8 +27,8 @@ import { state, watch, watchAll } from "./store.js";
 import { StripChart } from "./strip_chart.js";
 import { climb, climbRows, deviation } from "./study.js";
 import { Surface } from "./surface.js";
-import { connectionText } from "./transport.js";
 
+const FIRST = 0.5; // s: in this time of a response its settings are read
 const SHAKES = 2; // rad/s: a visible speed beyond the limit
 const LOOK_MS = 500;
 const STEPS_SHOWN = 40; // measurements shown in slow motion
@@ -55,6 +57,13 @@ const CHARTS = {
     caption: () => `Two errors of one move: ${shortName(state.integrator?.method)}, control period ${duration(period())}`,
     draw: () => drawErrors(surface, now.errors), ask: askErrors,
   },
+  responses: {
+    caption: () => "Joint 1 comes up to its setpoint",
+    draw: () => {
+      stripTime = newest();
+      drawResponses(surface, now.responses, present(), state.setpoint[0], LASTS);
+    },
+  },
   map: { caption: () => "Which period is stable", draw: paintMap, ask: askMap },
   ladder: { caption: () => "Error over run time", draw: () => drawLadder(surface, now.runs) },
   pictures: { caption: () => now.scene || "Twelve scenes", draw: paintMotions },
@@ -78,6 +87,8 @@ function anew() {
     bars: /** @type {number[]} */ ([]),
     errors: /** @type {{error: number | null, sampling: number | null} | null} */ (null),
     firstError: NaN,
+    responses: /** @type {import("./responses.js").Response[]} */ ([]),
+    response: "", // the settings of the present one; empty if they changed on the way, and once it is kept
     runs: /** @type {import("./ladder.js").Rung[]} */ ([]),
     runsKey: "", // the settings of `runs`
     asked: "", // the settings of the chart
@@ -90,6 +101,26 @@ function anew() {
   };
 }
 
+/** The steps whose task was done once. The browser keeps them, and a link carries them. @type {Set<string>} */
+const ticks = new Set();
+const TICKS = "pendularm-done";
+
+/** @param {...string} ids */
+function tick(...ids) {
+  for (const id of ids) ticks.add(id);
+  keepChoice(TICKS, [...ticks].join(","));
+  for (const [i, { id, title }] of STEPS.entries()) {
+    const button = byId("course-steps").children[i];
+    button.classList.toggle("done", ticks.has(id));
+    setAttribute(button, "aria-label", `Step ${i + 1}: ${title}${ticks.has(id) ? ", done" : ""}`);
+  }
+}
+
+/** The ticks in the form of a link; empty without one. */
+export function ticksInLink() {
+  return ticks.size > 0 ? `done=${[...ticks].join(",")}&` : "";
+}
+
 export function startCourse() {
   surface = new Surface(byId("course-chart"), () => CHARTS[STEPS[at].chart].draw?.());
   byId("course-back").addEventListener("click", () => go(at - 1));
@@ -99,6 +130,7 @@ export function startCourse() {
   byId("course-steps").append(...STEPS.map((one, i) => el("button", {
     type: "button", class: "small", "data-step": one.id, "aria-label": `Step ${i + 1}: ${one.title}`, title: one.title, onclick: () => go(i),
   }, String(i + 1))));
+  tick(...stepsIn(remembered(TICKS)), ...stepsIn(new URLSearchParams(location.hash.slice(1)).get("done")));
   at = Math.max(0, stepIn(location.hash));
   watch("links", open);
   let before = "";
@@ -170,9 +202,11 @@ async function begin() {
   if (!now.began) return;
   remember();
   const { scene, offset, paused, title, text } = STEPS[at];
-  const refused = await setScene(scene(state.links), paused === true);
+  // An arm that starts elsewhere is not yet moving there.
+  const refused = await setScene(scene(state.links), paused === true || offset !== undefined);
   if (mine !== now) return;
   if (offset) await setState(offset.slice(0, state.links));
+  if (offset && !paused) await pause(false);
   if (mine !== now) return;
   setText(byId("course-status"), refused);
   now.ready = true;
@@ -184,9 +218,12 @@ async function begin() {
 
 /** Restarts the arm of the step, with the present settings. */
 async function again() {
+  const { offset, paused } = STEPS[at];
+  if (!offset) return void await beginAnew();
+  await pause(true);
   await beginAnew();
-  const { offset } = STEPS[at];
-  if (offset) await setState(offset.slice(0, state.links));
+  await setState(offset.slice(0, state.links));
+  if (!paused) await pause(false);
 }
 
 /** The arm takes two control steps a second. It begins again after some, with another period, and when it has diverged. */
@@ -210,7 +247,7 @@ async function slowMotion(mine) {
  */
 async function changed(change) {
   const answer = await change;
-  if (answer.result && (state.diverged || STEPS[at].chart === "energy")) await again();
+  if (answer.result && (state.diverged || ["energy", "responses"].includes(STEPS[at].chart))) await again();
   return answer;
 }
 
@@ -245,7 +282,10 @@ function show() {
   byId("course-start").disabled = state.links === 0 || lost;
   byId("course-back").disabled = at === 0;
   byId("course-next").disabled = at === STEPS.length - 1;
-  [...byId("course-steps").children].forEach((button, i) => { if (i === at) button.setAttribute("aria-current", "step"); else button.removeAttribute("aria-current"); });
+  [...byId("course-steps").children].forEach((button, i) => {
+    if (i === at) button.setAttribute("aria-current", "step");
+    else button.removeAttribute("aria-current");
+  });
   byId("course-chart").hidden = !CHARTS[one.chart].draw || one.chart === "pictures";
   markOutdated(false);
   byId("course-extra").replaceChildren();
@@ -263,14 +303,38 @@ function fillExtra(one) {
       type: "button", "data-method": method, "aria-pressed": String(method === state.integrator?.method), onclick: () => changed(setIntegrator({ method })),
     }, shortName(method)))));
   }
+  if (one.chart === "responses") place.append(motorButtons());
   if (one.chart === "map") {
     place.append(el("div", { class: "buttons", role: "group", "aria-label": "mass of the last link" }, ...MASSES.map((mass) => el("button", {
       type: "button", class: "small", "data-mass": mass, onclick: () => changed(setParams({ masses: [...state.params.masses.slice(0, -1), mass] })),
     }, `last link ${mass} kg`))));
   }
-  if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure", onclick: ({ target }) => busy(target, "Measuring…", measure) }, "Measure"));
+  if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure",
+    onclick: ({ target }) => busy(target, "Measuring…", measure) }, "Measure"));
   if (one.chart === "pictures") place.append(gallery(state.links));
   if (one.chart === "form") showForm(place, () => { now.seen.sheet = true; look(); });
+}
+
+/** The effort limit, and what the integral does at it. */
+function motorButtons() {
+  const choices = [["no limit", null, "clamp"], ["no cure", WEAK, "none"], ["conditional", WEAK, "conditional"],
+    ["back-calculation", WEAK, "back_calculation"]];
+  const set = (weak, anti_windup) => changed(setMotors({ effort: weak && weak[state.links], anti_windup }));
+  return el("div", { class: "buttons", role: "group", "aria-label": "effort limit and anti-windup" }, ...choices.map(([name, weak, anti]) => el("button", {
+    type: "button", class: "small", "data-motors": JSON.stringify([weak !== null, anti]), disabled: !state.motors, onclick: () => set(weak, anti),
+  }, weak ? `${weak[state.links][0]} N m, ${name}` : name)));
+}
+
+/** The three gains of joint 1. The other joints have them in proportion. */
+function gainFields() {
+  const ranges = /** @type {Record<string, [string, number, number]>} */ ({
+    kp: ["N m/rad", 20, 2000], ki: ["N m/(rad s)", 2, 2000], kd: ["N m s/rad", 5, 200] });
+  return Object.entries(ranges).map(([key, [unit, low, high]]) => {
+    const base = SOFT[state.links][key];
+    const commit = (value) => changed(setGains({ [key]: base.map((one) => Number(((value * one) / base[0]).toPrecision(6))) }));
+    const field = numberField({ label: `${key} of joint 1`, short: key, unit, low, high, log: true, zero: key === "ki", commit });
+    return { element: field.element, show: () => field.accept(state.gains[key][0]) };
+  });
 }
 
 /** Pictures of the scenes, by number of links: made once. @type {Record<number, HTMLElement>} */
@@ -289,7 +353,8 @@ function pictures(scenes, links) {
     const canvas = el("canvas", { "aria-hidden": "true" });
     const { text, act } = offer(scene, links);
     new Surface(canvas, (surface) => drawPicture(surface, scene));
-    return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: act === null, onclick: act }, canvas, el("span", {}, scene.name), el("small", {}, text));
+    return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: act === null, onclick: act }, canvas,
+      el("span", {}, scene.name), el("small", {}, text));
   }))];
 }
 
@@ -354,11 +419,13 @@ function clock(one) {
   if (one.dial !== "timestep") {
     return {
       label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => changed(setPeriod({ period: seconds(ms) })),
-      value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state), fit: (ms) => multipleOf(1e3 * state.integrator.timestep, ms), rule: "it must be a whole number of timesteps",
+      value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state), fit: (ms) => multipleOf(1e3 * state.integrator.timestep, ms),
+        rule: "it must be a whole number of timesteps",
     };
   }
   // In the chart of errors the period does not change. Energy has no limit: a stable method may lose it.
-  const whole = one.chart === "errors" ? { high: 4, fit: (ms) => partOf(1e3 * (state.period?.period ?? 0), ms), rule: "it must divide the control period" } : { high: 100 };
+  const whole = one.chart === "errors"
+    ? { high: 4, fit: (ms) => partOf(1e3 * (state.period?.period ?? 0), ms), rule: "it must divide the control period" } : { high: 100 };
   return {
     label: "timestep", unit: "ms", low: 0.1, ...whole, commit: (ms) => changed(setIntegrator({ timestep: seconds(ms) })),
     value: () => 1e3 * (state.integrator?.timestep ?? NaN), limit: () => NaN,
@@ -374,8 +441,15 @@ function makeDial(one) {
   // While the scene is being set, its values would replace the student's.
   place.inert = now.began && !now.ready;
   if (!one.dial || state.links === 0) return;
+  if (one.dial === "gains") {
+    const fields = gainFields();
+    place.append(...fields.map(({ element }) => element));
+    dial = { show: () => { for (const field of fields) if (state.gains) field.show(); } };
+    return dial.show();
+  }
   const { value, limit, ...options } = one.dial === "damping"
-    ? { label: "damping gains", unit: "times", low: FACTORS.low, high: FACTORS.high, commit: (factor) => changed(setGains({ kd: damped(factor) })), value: damping, limit: () => NaN }
+    ? { label: "damping gains", unit: "times", low: FACTORS.low, high: FACTORS.high, commit: (factor) => changed(setGains({ kd: damped(factor) })),
+      value: damping, limit: () => NaN }
     : clock(one);
   const field = numberField({ log: true, ...options });
   dial = { show: () => { field.accept(Number(value().toPrecision(6))); field.mark(one.guess && !now.ticked ? NaN : limit()); } };
@@ -388,7 +462,7 @@ function showBig() {
   const { kind } = verdict(state);
   const hidden = !one.dial || !now.began || (one.guess && now.guessed < 0);
   byId("course-big").hidden = hidden;
-  const { figure, what, judged } = one.chart === "energy" ? bigEnergy() : bigClock(one, kind);
+  const { figure, what, judged } = one.chart === "energy" ? bigEnergy() : one.chart === "responses" ? bigResponse() : bigClock(one, kind);
   setText(byId("course-figure"), hidden ? "" : figure);
   setText(byId("course-what"), what);
   const caption = CHARTS[one.chart].caption();
@@ -418,6 +492,32 @@ function bigEnergy() {
   return { figure: `${energy >= 0.005 ? "+" : ""}${fixed(energy, 2)} J`, what: "energy since the start", judged };
 }
 
+/** How far the arm has passed its setpoint. */
+function bigResponse() {
+  const points = present();
+  const { overshoot, error } = judge(points, state.setpoint[0]);
+  const isOver = state.time >= LASTS;
+  const figure = points.length > 0 ? `${significant(overshoot < 0.0005 ? 0 : overshoot, 2)} rad` : "–";
+  return { figure, what: isOver ? `overshoot; ${significant(error, 2)} rad from the setpoint after ${LASTS} s` : "overshoot so far", judged: "" };
+}
+
+/** Keeps the response once it is complete, and says what the responses have shown. */
+function lookAtResponse(seen) {
+  if (!state.gains) return;
+  const name = nameOf(state.gains, state.motors);
+  // A motion belongs to the settings of its start, if they have stayed.
+  if (state.time < FIRST) now.response = name;
+  else if (now.response !== name || state.enabled !== true || state.diverged) now.response = "";
+  if (now.response === "" || state.time < LASTS) return;
+  now.response = "";
+  const points = present();
+  now.responses = keepResponse(now.responses, { gains: state.gains, motors: state.motors, name, points, ...judge(points, state.setpoint[0]) });
+  const found = shown(now.responses);
+  for (const key of Object.keys(seen.responses)) seen.responses[key] ||= found[key];
+  const words = Object.keys(seen.responses).filter((key) => seen.responses[key]);
+  setText(byId("course-status"), words.length > 0 ? `Shown: ${words.join(", ")}.` : "");
+}
+
 function showTask() {
   const { task, guess, question } = STEPS[at];
   const { began, ticked, guessed, answered } = now;
@@ -431,9 +531,14 @@ function showTask() {
   if (place.dataset.shown === key) return;
   place.dataset.shown = key;
   place.replaceChildren();
-  if (guess && began && guessed < 0) ask(place, guess, -1, (k) => { now.guessed = k; show(); byId("course-dial").querySelector("input")?.focus({ preventScroll: true }); });
+  if (guess && began && guessed < 0) ask(place, guess, -1, (k) => {
+    now.guessed = k;
+    show();
+    byId("course-dial").querySelector("input")?.focus({ preventScroll: true });
+  });
   else if (ticked) {
-    if (guess) place.append(el("p", { class: "note" }, `${guessed === guess.right ? "Your guess was right." : `You guessed ${guess.answers[guessed]}.`} ${guess.because}`));
+    if (guess) place.append(el("p", { class: "note" },
+      `${guessed === guess.right ? "Your guess was right." : `You guessed ${guess.answers[guessed]}.`} ${guess.because}`));
     ask(place, question, answered, (k) => {
       now.answered = k;
       showTask();
@@ -474,9 +579,11 @@ function look() {
     const of = JSON.stringify([state.integrator, state.params]);
     seen.energy = followEnergy(seen.energy, of, state.integrator.timestep, newest(), record.data[record.last() + ENERGY]);
   }
+  if (one.chart === "responses") lookAtResponse(seen);
   refresh(one);
   if (!now.ticked && one.task.done(seen)) {
     now.ticked = true;
+    tick(one.id);
     announce("Done.");
     if (dial) dial.show();
     showBig();
@@ -488,8 +595,11 @@ function look() {
 function showChosen() {
   const { method } = /** @type {any} */ (state.integrator);
   const mass = state.params?.masses.at(-1);
-  for (const button of byId("course-extra").querySelectorAll("[data-method], [data-mass]")) {
-    setAttribute(button, "aria-pressed", String((button.dataset.method ?? method) === method && Number(button.dataset.mass ?? mass) === mass));
+  const motors = JSON.stringify([Boolean(state.motors?.effort), state.motors?.anti_windup]);
+  for (const button of byId("course-extra").querySelectorAll("[data-method], [data-mass], [data-motors]")) {
+    const { dataset } = button;
+    const isChosen = (dataset.method ?? method) === method && Number(dataset.mass ?? mass) === mass && (dataset.motors ?? motors) === motors;
+    setAttribute(button, "aria-pressed", String(isChosen));
   }
 }
 

@@ -22,9 +22,15 @@ export function timestepsFor(period = 0) {
   return all.filter((timestep, k) => timestep >= SHORTEST || k < LEAST);
 }
 
-/** @typedef {{method: string, timestep: number, error: number | null, sampling: number | null, uncertainty: number | null, wall: number, evaluations: number, divergedAt: number | null}} Rung */
+/**
+ * @typedef {{method: string, timestep: number, error: number | null, sampling: number | null, uncertainty: number | null, wall:
+ * number, evaluations: number, divergedAt: number | null}} Rung
+ */
 
-/** All runs, the cheapest first, so the picture grows steadily. @param {number} [period] of the controller [s] @returns {{method: string, timestep: number}[]} */
+/**
+ * All runs, the cheapest first, so the picture grows steadily. @param {number} [period] of the controller [s] @returns {{method:
+ * string, timestep: number}[]}
+ */
 export function rungs(period = 0) {
   return timestepsFor(period).flatMap((timestep) => METHODS.map(([method]) => ({ method, timestep })));
 }
@@ -141,7 +147,8 @@ export function describeRun(run, away, seconds) {
   const isJudged = ended === null && run.times.every((_, k) => away[k] != null);
   return {
     name: shortName(run.method),
-    outcome: ended !== null ? `diverged at t = ${fixed(ended, 2)} s` : !isJudged ? "–" : parts === undefined ? `within ${PARTED} rad` : `${PARTED} rad off from ${fixed(parts, 2)} s on`,
+    outcome: ended !== null ? `diverged at t = ${fixed(ended, 2)} s` : !isJudged ? "–" : parts === undefined ? `within ${PARTED} rad`
+      : `${PARTED} rad off from ${fixed(parts, 2)} s on`,
     energy: ended !== null || !Number.isFinite(gained) ? "–" : `${significant(gained, 3)} J`,
     error: isJudged ? `${significant(Math.max(...away.map(Number)), 3)} rad` : "–",
     evaluations: significant(run.evaluations, 6),

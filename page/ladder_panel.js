@@ -95,7 +95,8 @@ function inWords(best) {
   }
   const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
   const uncertainty = uncertaintyOf(found);
-  return `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} of run time, at a timestep of ${duration(cheap.timestep)}.${meaning}`
+  return `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} of run time, at a timestep of `
+    + `${duration(cheap.timestep)}.${meaning}`
     + (uncertainty === null ? "" : ` The reference itself is known to ${significant(uncertainty, 1)} rad.`);
 }
 

@@ -308,10 +308,14 @@ export function whyText(/** @type {State} */ state) {
 function whyFree({ critical }, method, limit) {
   if (limit === 0) return `Why: nothing damps the free arm. With ${methodName(method)} even a small swing grows, however short the step is.`;
   if (limit === Infinity || !critical) return "";
-  return `Why: beyond ${duration(limit)} ${methodName(method)} no longer follows the fastest small swing of the free arm. Wide and fast swings may need shorter steps.`;
+  return `Why: beyond ${duration(limit)} ${methodName(method)} no longer follows the fastest small swing of the free arm. Wide and fast swings `
+    + `may need shorter steps.`;
 }
 
-/** The reason for the limit of a loop with a controller: the motion that grows first beyond the smallest limit of all poses. @param {any} answer @param {number} limit */
+/**
+ * The reason for the limit of a loop with a controller: the motion that grows first beyond the smallest limit of all poses.
+ * @param {any} answer @param {number} limit
+ */
 export function cause({ critical, minimum_over_poses_held: least, equilibrium_kind, timestep_limit_continuous }, limit) {
   if (limit === 0) {
     return equilibrium_kind === "unstable" || timestep_limit_continuous === 0
@@ -322,15 +326,18 @@ export function cause({ critical, minimum_over_poses_held: least, equilibrium_ki
   const joint = `joint ${critical.joint + 1}`;
   const percent = significant(100 * (critical.growth_per_step - 1), 2);
   const flips = critical.frequency * FLIP * BEYOND * least > NEARLY;
-  if (flips) return `${joint} is the fastest. A torque that is held longer overshoots: 10 % beyond the limit the deviation flips at every step and grows by ${percent} %.`;
-  return `a swing of ${joint} at ${significant(critical.frequency, 3)} Hz grows first: the torque comes too late and drives it. A higher derivative gain may help.`;
+  if (flips) return `${joint} is the fastest. A torque that is held longer overshoots: 10 % beyond the limit the deviation flips at every step `
+    + `and grows by ${percent} %.`;
+  return `a swing of ${joint} at ${significant(critical.frequency, 3)} Hz grows first: the torque comes too late and drives it. A higher `
+    + `derivative gain may help.`;
 }
 
 /** @param {Timesteps} limits */
 export function others(limits) {
   const finite = Object.values(limits);
   const [least, most] = [Math.min(...finite), Math.max(...finite)];
-  if (most <= ALIKE * least) return "A better method hardly helps here, because the controller acts only once a step. It makes the simulated motion more exact.";
+  if (most <= ALIKE * least) return "A better method hardly helps here, because the controller acts only once a step. It makes the simulated "
+    + "motion more exact.";
   const best = METHODS.filter(([method]) => limits[method] > most / ALIKE).map(([, name]) => name);
   return `${best.join(", ")}: ${most === Infinity ? "no limit was found" : `stable up to ${limitText(most)}`}.`;
 }

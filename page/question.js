@@ -3,6 +3,7 @@
 
 /** @typedef {{gravity: number, masses: number[], lengths: number[]}} Arm */
 /** @typedef {{kp: number[], ki: number[], kd: number[]}} Gains */
+/** @typedef {{effort: number[] | null, anti_windup: string, tracking_time: number}} Motors limits of the efforts [N m], and the anti-windup */
 /**
  * What the page knows of the live arm.
  * @typedef {object} Live
@@ -10,6 +11,7 @@
  * @property {Arm | null} params
  * @property {Gains | null} gains
  * @property {{method: string, timestep: number} | null} integrator
+ * @property {Motors | null} [motors] @property {{viscous: number[]} | null} [friction]
  * @property {{period: number, delay: boolean, effective_period?: number} | null} period
  * @property {boolean | null} enabled whether the controller is on
  * @property {Float64Array} setpoint @property {boolean} setpointKnown
@@ -22,6 +24,8 @@
  * @property {number[]} setpoint [rad]
  * @property {number} control_period [s]; 0 for every step
  * @property {boolean} delay whether a torque acts one period late
+ * @property {Motors} [limits] of the motors
+ * @property {number[]} [viscous] friction of each joint [N m s/rad]
  * @property {number[]} q @property {number[]} qd pose and velocity at the start [rad, rad/s]
  * @property {string} integrator @property {number} timestep [s]
  */
@@ -42,14 +46,15 @@ export function noGains(n) {
  * is off are no part of it.
  * @param {Live} live @returns {Question | null}
  */
-export function questionOf({ links, params, gains, integrator, period, enabled, setpoint, setpointKnown, position, velocity }) {
+export function questionOf({ links, params, gains, integrator, period, friction, motors, enabled, setpoint, setpointKnown, position, velocity }) {
   if (!params || !gains || !integrator || !period || enabled === null || enabled === undefined) return null;
   if (gains.kp.length !== links || params.masses.length !== links || (enabled && !setpointKnown)) return null;
   const list = (/** @type {Float64Array} */ values) => Array.from(values.subarray(0, links));
   const loop = enabled
-    ? { gains, setpoint: list(setpoint), control_period: period.period, delay: period.delay }
+    ? { gains, setpoint: list(setpoint), control_period: period.period, delay: period.delay, ...(motors ? { limits: motors } : {}) }
     : { gains: noGains(links), setpoint: new Array(links).fill(0), control_period: 0, delay: false };
-  return { params, ...loop, q: list(position), qd: list(velocity), integrator: integrator.method, timestep: integrator.timestep };
+  const viscous = friction ? { viscous: friction.viscous } : {};
+  return { params, ...viscous, ...loop, q: list(position), qd: list(velocity), integrator: integrator.method, timestep: integrator.timestep };
 }
 
 /** The same loop from rest in a pose, by default stretched out. @param {Question} question @returns {Question} */

@@ -50,7 +50,7 @@ export function start(whenReset, whenChanging) {
   bridge.subscribe("/ik_trial/status", (msg) => set("trial", msg));
   pace();
   setInterval(() => { listen(); poll(); }, POLL_MS);
-  watch(["integrator", "gains", "params", "period", "enabled", "setpoint", "links"], askStability);
+  watch(["integrator", "gains", "params", "friction", "motors", "period", "enabled", "setpoint", "links"], askStability);
   watch(["params", "enabled"], () => {
     set("pushed", false);
     if (state.goal?.outcome === "reached") set("goal", null); // the arm is not at the goal any more
@@ -220,6 +220,8 @@ function poll() {
   setIntegrator({});
   setGains({});
   setPeriod({});
+  setFriction({});
+  setMotors({});
   pause();
   enable();
   askStability();
@@ -248,6 +250,8 @@ export const setParams = (args) => settings("/arm_sim/set_params", args, (values
 export const setIntegrator = (args) => settings("/arm_sim/set_integrator", args, (values) => keep("integrator", values));
 export const setGains = (args) => settings("/pid_controller/set_gains", args, (values) => keep("gains", values));
 export const setPeriod = (args) => settings("/pid_controller/set_period", args, (values) => keep("period", values));
+export const setFriction = (args) => settings("/arm_sim/set_friction", args, (values) => keep("friction", values));
+export const setMotors = (args) => settings("/pid_controller/set_limits", args, (values) => keep("motors", values));
 export const enable = (data) => settings("/pid_controller/enable", data === undefined ? {} : { data }, (values) => keep("enabled", values.data));
 export const disturb = (effort, seconds) => bridge.call("/arm_sim/disturb", { effort, duration: seconds });
 export const solve = (target) => bridge.call("/ik/solve", target);

@@ -25,11 +25,15 @@ let fields = {};
 let gravity;
 let said;
 
-/** Puts the form into `place`, with the present arm's values. `whenMade` is called after a sheet has been made. @param {HTMLElement} place @param {() => void} whenMade */
+/**
+ * Puts the form into `place`, with the present arm's values. `whenMade` is called after a sheet has been made. @param
+ * {HTMLElement} place @param {() => void} whenMade
+ */
 export function showForm(place, whenMade) {
   const known = /** @type {any} */ ({ ...DEFAULTS[state.links].params, ...DEFAULTS[state.links].gains, ...state.params, ...state.gains });
   gravity = option({ label: "gravity", unit: "m/s²", value: known.gravity });
-  fields = Object.fromEntries(LISTS.map(([key, name]) => [key, known[key].map((/** @type {number} */ value, /** @type {number} */ i) => option({ label: `${name} ${i + 1}`, value }))]));
+  fields = Object.fromEntries(LISTS.map(([key, name]) => [key,
+    known[key].map((/** @type {number} */ value, /** @type {number} */ i) => option({ label: `${name} ${i + 1}`, value }))]));
   const form = el("div", { id: "own-form" });
   const go = () => busy(said.buttons[0], "Computing…", async () => { if (await make()) whenMade(); });
   said = panel(form, [...Object.values(fields).flat(), gravity], [["Make my sheet", go, { type: "submit", class: "primary" }]]);
@@ -71,16 +75,19 @@ function sheet(params, gains, answers, link) {
   const row = (/** @type {string} */ name, /** @type {string} */ value) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, value));
   const period = answers.rk4.control_period_limit ?? Infinity;
   const free = isFree(gains);
-  const reason = free ? "all gains are 0, so no controller holds this arm." : period === Infinity ? "no limit of this arm was found." : cause(answers.rk4, period);
+  const reason = free ? "all gains are 0, so no controller holds this arm." : period === Infinity ? "no limit of this arm was found."
+    : cause(answers.rk4, period);
   return [
     el("h3", {}, "My arm and its two clocks"),
     el("table", {}, el("tbody", {},
       row("Masses", `${text(params.masses)} kg`), row("Lengths", `${text(params.lengths)} m`), row("Gravity", `${significant(params.gravity, 4)} m/s²`),
       row("Gains kp", `${text(gains.kp)} N m/rad`), row("Gains ki", `${text(gains.ki)} N m/(rad s)`), row("Gains kd", `${text(gains.kd)} N m s/rad`),
       row("Longest control period, stretched out", free ? "no controller" : period === 0 ? "none" : limitText(period)),
-      ...METHODS.map(([method, name]) => row(`Longest timestep, ${free ? "small swings" : "the controller at each step, stretched out"}, ${name}`, limitText(held(answers[method])))),
+      ...METHODS.map(([method, name]) => row(`Longest timestep, ${free ? "small swings" : "the controller at each step, stretched out"}, ${name}`,
+        limitText(held(answers[method])))),
       row("Longest timestep in every pose, Runge–Kutta 4", limitText(answers.rk4.minimum_over_poses_held ?? Infinity)),
-      ...METHODS.map(([method, name]) => row(`Largest error of the method [rad] in a ${free ? "swing" : "move"} of ${MOVE} s at ${1e3 * AT} ms, ${name}`, answers[method].error)),
+      ...METHODS.map(([method, name]) => row(`Largest error of the method [rad] in a ${free ? "swing" : "move"} of ${MOVE} s at ${1e3 * AT} ms, `
+        + `${name}`, answers[method].error)),
     )),
     el("p", {}, `Reason: ${reason}`),
     ...(free || period === 0 ? [] : [el("p", {}, others(Object.fromEntries(METHODS.map(([method]) => [method, held(answers[method])]))))]),

@@ -154,7 +154,8 @@ const push = latestOnly(async ({ loop, key, steps }) => {
   const isOff = isFree(loop.gains);
   const outcome = isOff ? "nothing damps the push"
     : `the push ${shrinks(heights) ? "shrinks" : "does not shrink"} over ${LOOKS} ${steps > 1 ? "measurements" : "steps"}`;
-  setText(byId("push-text"), `${isOff ? "The free arm" : "The controller’s loop"} at ${steps > 1 ? "a control period of " : ""}${duration(every)}: ${outcome}.`);
+  setText(byId("push-text"), `${isOff ? "The free arm" : "The controller’s loop"} at `
+    + `${steps > 1 ? "a control period of " : ""}${duration(every)}: ${outcome}.`);
   bars.redraw();
 }, ASK_MS);
 

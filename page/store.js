@@ -24,6 +24,8 @@ export const state = {
   params: null, // { gravity, masses, lengths }
   integrator: null, // { method, timestep }
   gains: null, // { kp, ki, kd }
+  friction: null, // { viscous }: friction of each joint [N m s/rad]
+  motors: null, // { effort, anti_windup, tracking_time }: limits of the efforts [N m] or null, and the anti-windup [s]
   period: null, // { period, effective_period, delay }: the control period [s]
   paused: null,
   enabled: null, // whether the controller is on
@@ -45,7 +47,7 @@ const watchers = new Map(); // key -> functions
 const everything = []; // functions
 
 /** The keys on which the verdict on the active loop depends. */
-export const LOOP = ["connection", "links", "integrator", "gains", "params", "period", "enabled", "setpoint", "diagnostics", "limits"];
+export const LOOP = ["connection", "links", "integrator", "gains", "params", "friction", "motors", "period", "enabled", "setpoint", "diagnostics", "limits"];
 
 /** @param {string | string[]} keys @param {(value: any) => void} react */
 export function watch(keys, react) {

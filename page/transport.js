@@ -7,7 +7,7 @@ import { announce, byId, el, passFocus, setText, warn } from "./dom.js";
 import { refusal } from "./field.js";
 import { duration, fixed } from "./format.js";
 import { limitInForce, SLOW, verdict } from "./policy.js";
-import { isAlone } from "./kernel.js";
+import { connectionText, MANY } from "./readouts.js";
 import { pause, setPeriod, step } from "./runtime.js";
 import { LOOP, state, watch } from "./store.js";
 
@@ -44,19 +44,6 @@ export async function singleStep() {
 
 // Notices, the most serious first
 
-/** Attempts to connect before the page says what may be wrong. */
-const MANY = 3;
-
-/** Why the page has no arm, and what may help; empty while it has one. */
-export function connectionText() {
-  const { connection, failures, links } = state;
-  if (connection === "open") return "";
-  if (connection === "silent") return "No answer from the arm. The figures are old.";
-  const text = links > 0 ? "Connection lost. Trying again…" : "Connecting to the arm…";
-  if (failures < MANY || isAlone) return text;
-  return `${text} The server may be stopped. Or it refuses pages of this address: then start it with --allow-origin ${location.origin}`;
-}
-
 function showNotice() {
   const notice = choose();
   // A button with another figure is another button.
@@ -72,7 +59,8 @@ function showNotice() {
   box.hidden = !notice;
   byId("stage").classList.toggle("diverged", notice?.key === "diverged");
   if (notice?.kind === "bad" && notice.key !== "diverged" && notice.key !== "lost") warn(notice.text); // those two are announced already
-  if (notice) box.replaceChildren(el("p", {}, notice.text), ...notice.buttons.map(([text, act]) => el("button", { type: "button", class: "small", onclick: act }, text)));
+  if (notice) box.replaceChildren(el("p", {}, notice.text),
+    ...notice.buttons.map(([text, act]) => el("button", { type: "button", class: "small", onclick: act }, text)));
 }
 
 function choose() {
@@ -88,14 +76,16 @@ function choose() {
   // No timestep helps if the gains are the cause.
   const other = state.enabled && limitInForce(state).everyPose === 0 ? [["Suggest gains", takeSuggestion]] : [];
   if (kind === "diverged") {
-    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Restart", () => said.report(beginAnew())]] };
+    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`,
+      buttons: [...smaller, ...other, ["Restart", () => said.report(beginAnew())]] };
   }
   if (kind === "beyond" || (kind === "never" && state.enabled)) return { key: "limit", kind: "bad", text: sentence, buttons: [...smaller, ...other] };
   if (diagnostics?.level === 1 && !state.paused && diagnostics.real_time_factor < SLOW) {
     return { key: "slow", kind: "warn", text: `The runtime can't keep up: ${diagnostics.real_time_factor.toFixed(2)} of real time.`, buttons: [] };
   }
   if (state.enabled === false && (goal?.outcome === "active" || state.trial?.running)) {
-    return { key: "controller", kind: "calm", text: "The controller is off, so the arm swings freely and does not follow.", buttons: [["Turn the controller on", () => switchController(true)]] };
+    return { key: "controller", kind: "calm", text: "The controller is off, so the arm swings freely and does not follow.",
+      buttons: [["Turn the controller on", () => switchController(true)]] };
   }
   if (state.paused && goal?.outcome === "active") {
     return { key: "paused", kind: "calm", text: "Paused: the arm does not move.", buttons: [["Run", togglePause]] };

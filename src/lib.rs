@@ -15,7 +15,7 @@
 //! | `batch` | yes | `math::simulation::batch`: many arms in the lanes of the processor's registers |
 //! | `report` | yes | `report`, with its experiments |
 //! | `record` | yes | `record`: records of runs, written, read and replayed |
-//! | `cli` | yes | `command`: commands for a running pendularm, completions |
+//! | `cli` | yes | `command`: commands for a running pendularm, completions; `score` |
 //! | `conformance` | yes | `referee`: the rules of the specification against any server |
 //!
 //! Without default features the library is [`math`] and [`study`], which is enough to step arms. Its dependencies
@@ -61,6 +61,8 @@ pub mod record;
 pub mod referee;
 #[cfg(feature = "report")]
 pub mod report;
+#[cfg(feature = "cli")]
+pub mod score;
 #[cfg(feature = "services")]
 pub mod services;
 #[cfg(feature = "runtime")]

@@ -13,6 +13,7 @@ mod dynamics;
 mod fields;
 mod floats;
 mod gains;
+mod held;
 mod patience;
 mod simulation;
 mod state;
@@ -41,6 +42,8 @@ mod native {
     use crate::floats::PromisedFloats;
     #[pymodule_export]
     use crate::gains::default_gains;
+    #[pymodule_export]
+    use crate::held::held_limit;
     #[pymodule_export]
     use crate::simulation::{Divergence, Simulation};
     #[pymodule_export]

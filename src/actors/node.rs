@@ -15,17 +15,21 @@
 
 use std::collections::HashMap;
 use std::fmt::Display;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::future::ready;
+use std::pin::Pin;
 use std::sync::{Arc, Weak};
+use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
 use serde::Serialize;
 use tokio::sync::oneshot;
+use tokio::time::timeout;
 
 use crate::actors::ConnectionId;
+use crate::actors::resources::gone::Gone;
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
-use crate::actors::resources::memory::{Memory, Permit, SHORT, cover};
+use crate::actors::resources::memory::{Memory, PERMIT_TIME, Permit, SHORT, cover};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::fields::Rejections;
@@ -67,6 +71,8 @@ impl Unserved {
     pub const NO_ARM: Self = Self("arm_sim does not answer");
     /// The caller has disconnected.
     pub const CALLER_GONE: Self = Self("the caller is gone");
+    /// Other answers have used the memory for too long.
+    pub const NO_MEMORY: Self = Self("other long answers use the memory; call again later");
 }
 
 /// A guard of an op that has not yet taken effect: a call, a goal, a message for a node, or a long
@@ -93,11 +99,14 @@ pub trait Asker<T>: Send {
     /// Sends, before the answer, the reason why the request has no effect yet. For a node this is in the answer.
     fn warn(&self, _why: &str) {}
 
-    /// Reserves memory for an answer of at most `bytes` bytes before it is computed. `false` while there is not enough.
-    fn reserve(&mut self, _bytes: usize) -> bool {
-        true
+    /// Waits for memory for an answer of at most `bytes` bytes, before it is computed.
+    fn reserve(&mut self, _bytes: usize) -> Reserving<'_> {
+        Box::pin(ready(Ok(())))
     }
 }
+
+/// A wait for memory. It ends with an error if the caller has disconnected, or if it takes too long.
+pub type Reserving<'a> = Pin<Box<dyn Future<Output = Result<(), Unserved>> + 'a>>;
 
 /// The way back to the caller: one answer, then the end of the call.
 ///
@@ -125,11 +134,14 @@ impl<T> Reply<T> {
         self.asker.as_ref().is_some_and(|asker| asker.is_gone())
     }
 
-    /// Reserves memory for an answer of at most `bytes` bytes before it is computed. `false` while there is not enough.
-    /// Short answers need no reservation.
-    pub fn reserve(&mut self, bytes: usize) -> bool {
-        let asker = self.asker.as_mut();
-        asker.is_none_or(|asker| asker.reserve(bytes))
+    /// Waits for memory for an answer of at most `bytes` bytes, before it is computed. Short answers need none. Refuses
+    /// the call and returns `false` if there is none.
+    pub async fn reserve(&mut self, bytes: usize) -> bool {
+        let reserved = match &mut self.asker {
+            Some(asker) => asker.reserve(bytes).await,
+            None => Ok(()),
+        };
+        reserved.map_err(|why| self.refuse(why)).is_ok()
     }
 
     /// Sends a client a status, before the answer, with the reason why the request has no effect yet.
@@ -265,14 +277,14 @@ pub struct ClientLink {
     /// The connection.
     pub connection: ConnectionId,
     /// Set when the client has disconnected.
-    pub gone: Arc<AtomicBool>,
+    pub gone: Gone,
 }
 
 impl ClientLink {
     /// Whether the client has disconnected.
     #[must_use]
     pub fn is_gone(&self) -> bool {
-        self.gone.load(Ordering::Relaxed)
+        self.gone.is_set()
     }
 
     /// Sends a status with the reason why the frame with this `id` has no effect, or none yet.
@@ -439,8 +451,10 @@ pub struct Caller {
     link: ClientLink,
     /// None once the answer has been given.
     address: Option<Address>,
-    /// The room that is taken for a long answer, or else for the long frame that asked.
+    /// The room that is taken for the long frame that asked.
     permit: Option<Permit>,
+    /// The room that is taken for a long answer.
+    room: Option<Permit>,
     done: Option<Done>,
     /// The pools for long answers.
     memory: Memory,
@@ -461,6 +475,7 @@ impl Caller {
             link,
             address: Some(address),
             permit,
+            room: None,
             done: Some(done),
             memory,
         };
@@ -479,19 +494,29 @@ impl Caller {
         self.link.is_gone()
     }
 
-    /// Reserves memory for an answer of at most `bytes` bytes, besides the echo of the caller's `id`, before it is
-    /// computed. `false` while other answers use it. Short answers need no reservation.
-    pub fn reserve(&mut self, bytes: usize) -> bool {
+    /// Waits for memory for an answer of at most `bytes` bytes, besides the echo of the caller's `id`, before it is
+    /// computed. A caller whose frame has a permit waits for at most [`PERMIT_TIME`].
+    ///
+    /// # Errors
+    /// If the caller has disconnected, or has waited for too long.
+    pub async fn reserve(&mut self, bytes: usize) -> Result<(), Unserved> {
         let id = self.id().map_or(0, |id| id.get().len());
         let bytes = bytes.saturating_add(id);
-        if bytes <= SHORT {
-            return true;
+        // Two callers that kept a part each, and waited for more, could wait for each other.
+        self.room = None;
+        if bytes > SHORT {
+            let limit = self.permit.as_ref().map_or(Duration::MAX, |_| PERMIT_TIME);
+            let room = timeout(limit, self.memory.answer(bytes));
+            tokio::select! {
+                biased;
+                room = room => self.room = Some(room.map_err(|_| Unserved::NO_MEMORY)?),
+                () = self.link.gone.wait() => {}
+            }
         }
-        let Some(permit) = self.memory.answer(bytes) else {
-            return false;
-        };
-        self.permit = Some(permit);
-        true
+        if self.is_gone() {
+            return Err(Unserved::CALLER_GONE);
+        }
+        Ok(())
     }
 
     /// Answers `result: true`. The call ends when this value is dropped.
@@ -507,7 +532,8 @@ impl Caller {
     /// Answers, unless that has been done.
     fn answer(&mut self, done: Option<Done>, write: impl FnOnce(&Address) -> Bytes) {
         if let Some(address) = self.address.take() {
-            let frame = cover(self.permit.as_ref(), write(&address));
+            let permit = self.room.as_ref().or(self.permit.as_ref());
+            let frame = cover(permit, write(&address));
             let kind = FrameKind::Answer(address.service());
             self.link.send(kind, frame, done);
         }
@@ -547,8 +573,8 @@ impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
         self.caller.link.status(Level::Warning, why, id);
     }
 
-    fn reserve(&mut self, bytes: usize) -> bool {
-        self.caller.reserve(bytes)
+    fn reserve(&mut self, bytes: usize) -> Reserving<'_> {
+        Box::pin(self.caller.reserve(bytes))
     }
 }
 

@@ -41,7 +41,7 @@ use crate::math::pid::Gains;
 use crate::options::{DEFAULT_BIND, Links, Options};
 use crate::signals::Signals;
 #[cfg(feature = "web")]
-use crate::web::Site;
+use crate::web::{Site, report};
 
 /// A time longer than any run of the program.
 const FOR_EVER: Duration = Duration::from_secs(100 * 365 * 24 * 60 * 60);
@@ -51,6 +51,14 @@ const SHUTTING_DOWN: &str = "shutting down";
 /// the second after a signal.
 const ANSWER_TIME: Duration = Duration::from_millis(250);
 const FLUSH_TIME: Duration = Duration::from_millis(400);
+/// Further threads, for the files of the report. A disk that hangs occupies all of them.
+const FILES: usize = {
+    #[cfg(feature = "web")]
+    let files = report::FILES;
+    #[cfg(not(feature = "web"))]
+    let files = 0;
+    files
+};
 /// Longest time for the end of a record when the runtime ends.
 #[cfg(feature = "record")]
 const RECORD_TIME: Duration = Duration::from_millis(250);
@@ -86,7 +94,7 @@ pub fn run(options: &Options, force_exit: Box<dyn FnOnce() + Send>) -> Result<()
     let tokio = Builder::new_current_thread()
         .enable_all()
         .on_thread_start(lower_priority)
-        .max_blocking_threads(THREADS)
+        .max_blocking_threads(THREADS + FILES)
         .thread_keep_alive(FOR_EVER)
         .build()?;
     start_long_work_threads(&tokio)?;
@@ -305,6 +313,7 @@ async fn shut_down(
 ) {
     let _ = registry.send(RefuseCalls(SHUTTING_DOWN)).await;
     workers.close(SHUTTING_DOWN);
+    gauges.memory().close();
     let answered = Instant::now() + ANSWER_TIME;
     for node in busy {
         let _ = timeout_at(answered, node.send(ShutDown(SHUTTING_DOWN))).await;

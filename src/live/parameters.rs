@@ -46,6 +46,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             Parameter::Gravity => Number(arm.gravity()),
             Parameter::Masses => PerJoint(*arm.masses()),
             Parameter::Lengths => PerJoint(*arm.lengths()),
+            Parameter::Viscous => PerJoint(*arm.viscous()),
             Parameter::Kp => PerJoint(gains.kp),
             Parameter::Ki => PerJoint(gains.ki),
             Parameter::Kd => PerJoint(gains.kd),
@@ -66,6 +67,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     fn set(&mut self, change: ParameterChange<N>) -> Rejections {
         match change {
             ParameterChange::Params(ask) => ask.perform(self).rejected,
+            ParameterChange::Friction(ask) => ask.perform(self).rejected,
             ParameterChange::Gains(ask) => ask.perform(self).rejected,
             ParameterChange::Integrator(ask) => ask.perform(self).rejected,
             ParameterChange::Period(ask) => ask.perform(self).rejected,

@@ -69,6 +69,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     /// Measures the drift from the present energy.
     pub(super) fn restart_energy_drift(&mut self) {
         self.counts.energy_reference = energy(&self.simulation);
+        self.loads.friction = 0.0;
     }
 
     /// Publishes the message of `make`, which is called when the frame is written.
@@ -126,7 +127,11 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             ("real_time_factor", rates.real_time_factor),
             ("steps_per_second", rates.steps_per_second),
             ("energy", energy),
-            ("energy_drift", energy - self.counts.energy_reference),
+            (
+                "energy_drift",
+                energy + self.loads.friction - self.counts.energy_reference,
+            ),
+            ("friction_loss", self.loads.friction),
             ("max_step_time", self.counts.window.longest.step_time()),
             ("control_period", self.effective_period()),
             ("control_period_limit", self.period_limit()),

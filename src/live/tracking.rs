@@ -93,7 +93,10 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     pub(super) fn advance(&mut self, steps: u64, waits: bool) -> (u64, Option<GoalProgress<N>>) {
         let past = self.goals.past;
         let tracked = self.goals.tracked.as_mut();
-        let loads = Loads::are_watched(&self.simulation).then_some(&mut self.loads);
+        let mut loads = Loads::are_watched(&self.simulation).then_some(&mut self.loads);
+        if let Some(loads) = &mut loads {
+            loads.begin(&self.simulation);
+        }
         let Some(tracked) = tracked.filter(|goal| goal.commanded) else {
             let Some(loads) = loads else {
                 return (self.simulation.advance(steps), None);
@@ -104,7 +107,6 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             };
             return (self.simulation.advance_with(steps, count), None);
         };
-        let mut loads = loads;
         let (mut progress, mut reached) = (None, None);
         let world = &self.world;
         let taken = self.simulation.advance_with(steps, |simulation| {

@@ -8,7 +8,7 @@
 use std::env;
 use std::ffi::OsString;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
-#[cfg(any(feature = "record", feature = "web"))]
+#[cfg(any(feature = "record", feature = "web", feature = "cli"))]
 use std::path::PathBuf;
 
 use clap::builder::Resettable;
@@ -144,6 +144,14 @@ pub enum Parsed {
     Replay {
         /// The record, from --record or /recorder/start
         file: PathBuf,
+    },
+    /// Recompute episodes of the Python environments from their submissions, and print scores and verdicts
+    #[cfg(feature = "cli")]
+    #[command(after_help = "Exit status: 0 if every submission is confirmed, 1 if not.")]
+    Score {
+        /// The submissions, from pendularm.submission
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
     },
     /// Test any server of the protocol against the rules of the specification
     #[cfg(feature = "conformance")]

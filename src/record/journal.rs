@@ -205,14 +205,20 @@ impl<const N: usize> Noted for Limits<N> {
 impl<const N: usize> Noted for Arm<N> {
     fn write(&self) -> Value {
         let (masses, lengths) = (self.masses().write(), self.lengths().write());
-        json!({"gravity": self.gravity(), "masses": masses, "lengths": lengths})
+        let mut written = json!({"gravity": self.gravity(), "masses": masses, "lengths": lengths});
+        if self.has_friction() {
+            written["viscous"] = self.viscous().write();
+        }
+        written
     }
 
     fn read(_: &'static str, from: &Value) -> Result<Self, NoteError> {
         let lengths = Noted::read("lengths", &from["lengths"])?;
         let masses = Noted::read("masses", &from["masses"])?;
         let gravity = Noted::read("gravity", &from["gravity"])?;
-        Ok(Self::new(lengths, masses, gravity)?)
+        let viscous: Option<[f64; N]> = Noted::read("viscous", &from["viscous"])?;
+        let arm = Self::new(lengths, masses, gravity)?;
+        Ok(arm.with_friction(viscous.unwrap_or([0.0; N]))?)
     }
 }
 

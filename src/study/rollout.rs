@@ -406,5 +406,7 @@ fn neighbour<const N: usize>(arm: &Arm<N>, index: usize) -> Arm<N> {
             _ => (length.next_up(), mass.next_down()),
         };
     }
-    Arm::new(lengths, masses, arm.gravity()).unwrap_or(*arm)
+    let neighbour = Arm::new(lengths, masses, arm.gravity());
+    let neighbour = neighbour.and_then(|one| one.with_friction(*arm.viscous()));
+    neighbour.unwrap_or(*arm)
 }

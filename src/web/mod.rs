@@ -73,6 +73,23 @@ impl Site {
         look: impl FnOnce(&Path) -> T + Send + 'static,
     ) -> Option<(T, OwnedSemaphorePermit)> {
         let permit = Arc::clone(&self.files).acquire_owned().await.ok()?;
+        self.look_with(permit, look).await
+    }
+
+    /// The same, but `None` if no permit is free now.
+    async fn look_now<T: Send + 'static>(
+        &self,
+        look: impl FnOnce(&Path) -> T + Send + 'static,
+    ) -> Option<(T, OwnedSemaphorePermit)> {
+        let permit = Arc::clone(&self.files).try_acquire_owned().ok()?;
+        self.look_with(permit, look).await
+    }
+
+    async fn look_with<T: Send + 'static>(
+        &self,
+        permit: OwnedSemaphorePermit,
+        look: impl FnOnce(&Path) -> T + Send + 'static,
+    ) -> Option<(T, OwnedSemaphorePermit)> {
         let folder = self.report.clone();
         if folder.as_os_str().is_empty() {
             // There is no file to wait for, and a simulation has only one thread.

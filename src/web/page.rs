@@ -3,7 +3,10 @@
 //! **Invariant:** every file of that folder is in the table, and no other file is served as part of the
 //! page.
 
+use std::time::Duration;
+
 use bytes::Bytes;
+use tokio::time::timeout;
 
 use super::response::{HttpResponse, file};
 use super::{Site, report};
@@ -11,6 +14,9 @@ use crate::address::Authority;
 
 /// The name of the document, which is served as `/`.
 const DOCUMENT: &str = "index.html";
+
+/// Time to look for the report.
+const LOOK_TIME: Duration = Duration::from_millis(250);
 
 /// A file of the page: its name in `page/`, and its bytes.
 pub type Asset = (&'static str, &'static [u8]);
@@ -26,9 +32,10 @@ pub const ASSETS: &[Asset] = assets! {
     "index.html" "icon.svg" "style.css" "actions.js" "aim.js" "arm_view.js" "chart.js" "compare.js"
     "controls.js" "course.js" "course_view.js" "dom.js" "field.js" "format.js" "history.js"
     "kernel.js" "keyboard.js" "ladder.js" "ladder_panel.js" "latest.js" "main.js" "mechanics.js"
-    "pencil.js" "plots.js" "policy.js" "question.js" "readouts.js" "rosbridge.js" "runtime.js"
-    "scale.js" "scenes.js" "settings.js" "sheet.js" "stability_panel.js" "store.js" "strip_chart.js"
-    "study.js" "surface.js" "tasks_panel.js" "theme.js" "trail.js" "transport.js" "views.js"
+    "motions.js" "pencil.js" "plots.js" "policy.js" "question.js" "readouts.js" "realism.js"
+    "responses.js" "rosbridge.js" "runtime.js" "scale.js" "scenes.js" "settings.js" "sheet.js"
+    "stability_panel.js" "store.js" "strip_chart.js" "study.js" "surface.js" "tasks_panel.js"
+    "theme.js" "trail.js" "transport.js" "views.js"
 };
 
 /// The file at `path`, if it is part of the page.
@@ -48,8 +55,9 @@ pub fn find(path: &str) -> Option<Asset> {
 pub async fn answer((name, bytes): Asset, own: &Authority, site: &Site) -> HttpResponse {
     let mut body = Bytes::from_static(bytes);
     if name == DOCUMENT {
-        let look = site.look(|folder| folder.join(report::INDEX).is_file());
-        if matches!(look.await, Some((true, _))) {
+        // The page is served without the link while others read all files that may be read, or if the disk hangs.
+        let look = site.look_now(|folder| folder.join(report::INDEX).is_file());
+        if let Ok(Some((true, _))) = timeout(LOOK_TIME, look).await {
             let html = String::from_utf8_lossy(bytes);
             body = html
                 .replace("href=\"report/\" hidden", "href=\"report/\"")

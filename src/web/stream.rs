@@ -15,8 +15,11 @@ use hyper::rt::ReadBufCursor;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, sleep_until};
 
-/// Longest time of an answer, from its request until the client has read the last byte.
-pub const ANSWER_TIME: Duration = Duration::from_secs(30);
+use super::report::MAX_FILE;
+
+/// Longest time of an answer, from its request until the client has read the last byte: 20 s, and a second for each MiB
+/// of a longest file. Other clients may wait for its permit.
+pub const ANSWER_TIME: Duration = Duration::from_secs(20 + MAX_FILE / (1024 * 1024));
 /// Longest time from an answer to the head of the next request. A browser that loads the page needs milliseconds,
 /// and every connection uses a place.
 pub const IDLE_TIME: Duration = Duration::from_secs(2);

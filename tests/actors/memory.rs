@@ -9,11 +9,17 @@ use crate::virtual_time::{Client, Gateway, WIDE, settle};
 use actix::prelude::*;
 use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::gateway::limits::{CLIENT_BYTES, MAX_LONG_FORMS, MAX_MEMORY};
-use pendularm::actors::gateway::registry::Nodes;
-use pendularm::actors::resources::memory::{LONG_ANSWERS, LONG_FRAMES, Memory, SHORT};
+use pendularm::actors::gateway::limits::{
+    CLIENT_BYTES, MAX_LONG_FORMS, MAX_MEMORY, RESPONSES_TIME,
+};
+use pendularm::actors::gateway::registry::{Attach, Nodes};
+use pendularm::actors::resources::long_work::{PLACES, WorkKind, WorkPermit};
+use pendularm::actors::resources::memory::{
+    LONG_ANSWERS, LONG_FRAMES, LONGEST_ANSWER, Memory, SHORT,
+};
+use pendularm::actors::ros::rosapi::RosapiNode;
 use serde_json::{Value, json};
-use tokio::time::sleep;
+use tokio::time::{sleep, timeout};
 
 const MIB: usize = 1024 * 1024;
 const STEP: &str = "/arm_sim/integration_step";
@@ -21,8 +27,9 @@ const STEP: &str = "/arm_sim/integration_step";
 /// `limits.rs` asserts that the sum is within the limit.
 #[test]
 fn places_and_pools_have_the_documented_sizes() {
-    const { assert!(CLIENT_BYTES == 1728 * 1024 && MAX_MEMORY == 648 * MIB) };
-    const { assert!(LONG_FRAMES == 3 && LONG_ANSWERS == 96 * MIB && SHORT == 64 * 1024) };
+    const { assert!(CLIENT_BYTES == 1728 * 1024 && MAX_MEMORY == 664 * MIB) };
+    const { assert!(LONG_FRAMES == 3 && SHORT == 64 * 1024) };
+    const { assert!(LONG_ANSWERS == 16 * MIB && LONGEST_ANSWER == 96 * MIB) };
     const { assert!(MAX_LONG_FORMS == 4) };
 }
 
@@ -60,10 +67,79 @@ fn each_kind_of_computation_reserves_memory_before_it_begins() {
             ask(&mut client, service, args).await;
             settle().await;
             assert!(workers.turn());
-            // A part is 16 KiB.
-            assert!(gateway.gauges.memory().taken() > 1, "{service}");
+            assert!(gateway.gauges.memory().taken() > SHORT, "{service}");
             workers.close("the end");
         }
+    });
+}
+
+#[test]
+fn a_caller_that_leaves_waits_for_no_memory_and_holds_up_nobody() {
+    in_virtual_time(async {
+        let workers = WorkerPool::without_threads();
+        let gateway = computing(MIB, &workers).await;
+        let memory = gateway.gauges.memory().clone();
+        let half = memory.answer(MIB / 2).await;
+        let (mut first, mut second) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        ask(&mut first, STEP, steps(10_000)).await;
+        settle().await;
+        ask(&mut second, STEP, steps(2_000)).await;
+        settle().await;
+        assert!(
+            workers.is_idle(),
+            "the first is due, and the second waits for it"
+        );
+        drop(first);
+        // Whether its answers are still read is found out in this time.
+        sleep(RESPONSES_TIME).await;
+        settle().await;
+        while workers.turn() {}
+        assert_eq!(second.receive().await["result"], true);
+        drop((half, second));
+        settle().await;
+        assert_eq!(memory.taken(), 0);
+        workers.close("the end");
+    });
+}
+
+#[test]
+fn a_long_list_that_waits_for_memory_occupies_no_thread_and_short_ones_pass() {
+    in_virtual_time(async {
+        let gateway = Gateway::within(Memory::of(1, MIB), Nodes::default()).await;
+        let rosapi = RosapiNode::new(gateway.registry.clone().recipient()).start();
+        let mut nodes = Nodes::default();
+        RosapiNode::attach(&rosapi, &mut nodes);
+        gateway.registry.send(Attach(nodes)).await.unwrap();
+        let memory = gateway.gauges.memory().clone();
+        let all = memory.answer(MIB).await;
+        let mut namer = gateway.connect(WIDE);
+        for n in 0..40 {
+            let topic = format!("/{n}/{}", "x".repeat(800));
+            namer
+                .send(&json!({"op": "advertise", "topic": topic}))
+                .await;
+        }
+        sleep(Duration::from_millis(100)).await;
+        let mut clients: Vec<Client> = (0..PLACES + 2).map(|_| gateway.connect(WIDE)).collect();
+        for client in &mut clients {
+            ask(client, "/rosapi/topics", json!({})).await;
+        }
+        settle().await;
+        let place = timeout(Duration::from_secs(1), WorkPermit::take(WorkKind::Listing)).await;
+        assert!(place.is_ok(), "the waiting lists have all places");
+        drop(place);
+        drop(all);
+        for client in &mut clients {
+            let answer = client.receive().await;
+            assert_eq!(answer["result"], true, "{answer}");
+            let topics = answer["values"]["topics"].as_array().unwrap();
+            let named = topics
+                .iter()
+                .filter(|name| name.as_str().unwrap().len() > 800);
+            assert_eq!(named.count(), 40);
+        }
+        settle().await;
+        assert_eq!(memory.taken(), 0);
     });
 }
 
@@ -73,11 +149,11 @@ fn computations_that_fit_only_after_one_another_wait_for_one_another() {
         let workers = WorkerPool::start(2).unwrap();
         // Memory for one answer of 10,000 steps at a time, and for a short one in addition.
         let gateway = computing(MIB, &workers).await;
-        // The first answer fits into no pipe, so it keeps its memory, more than 32 parts of it, until it is read.
+        // The first answer fits into no pipe, so it keeps its memory, more than half of it, until it is read.
         let pipes = [SHORT].into_iter().chain([WIDE; 11]);
         let mut clients: Vec<Client> = pipes.map(|size| gateway.connect(size)).collect();
         ask(&mut clients[0], STEP, steps(10_000)).await;
-        while gateway.gauges.memory().taken() < 32 {
+        while gateway.gauges.memory().taken() < MIB / 2 {
             sleep(Duration::from_millis(1)).await;
         }
         for client in &mut clients[1..] {

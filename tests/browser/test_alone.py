@@ -64,7 +64,7 @@ class AloneTest(PageTest):
         page.run("window.old = 1; document.querySelector('#links').value = '2'; document.querySelector('#links').dispatchEvent(new Event('change'))")
         page.until(f"window.old === undefined && {SHOWN} && document.querySelector('#links').value === '2'", why="the page anew")
         self.assertEqual(len(self.runtime.next("/joint_states")["position"]), 2)
-        self.assertEqual(page.run("location.hash"), "#step=2&links=2")
+        self.assertEqual(page.run("location.hash"), "#step=slow&links=2")
         self.assertEqual(page.complaints, [])
 
     def test_the_address_keeps_the_number_of_links_and_another_one_brings_that_arm(self):
@@ -75,6 +75,6 @@ class AloneTest(PageTest):
             self.assertEqual(page.run("location.hash"), after)
         page.until("document.querySelector('#course-start').textContent === 'Restart step'", why="a step that starts at once")
         page.click("#course-next")
-        self.assertEqual(page.run("location.hash"), "#step=5&links=2")
+        self.assertEqual(page.run("location.hash"), "#step=timestep&links=2")
         page.click("#view-switch")
         self.assertEqual(page.run("location.hash"), "#links=2")

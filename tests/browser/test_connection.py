@@ -21,13 +21,15 @@ class Reconnecting(PageTest):
         self.page.click("#defaults")
         # The timestep has no verdict, and what is typed or pressed is refused.
         self.page.until("document.querySelector('#run-state').textContent === 'no connection'")
-        self.assertEqual(self.page.run("[document.querySelector('#verdict').textContent, document.querySelector('#verdict-pill').hidden, document.querySelector('#undo').disabled, document.querySelector('#course-start').disabled]"), ["", True, True, True])
+        self.assertEqual(self.page.run("[document.querySelector('#verdict').textContent, document.querySelector('#verdict-pill').hidden, "
+            "document.querySelector('#undo').disabled, document.querySelector('#course-start').disabled]"), ["", True, True, True])
         self.assertNotIn("defaults", self.page.text("#announce-polite"), "nothing was set")
         self.page.until("document.querySelector('#out-rtf').textContent.startsWith('–')")
         for field, typed in (("#setpoint-fields", "1"), ("#timestep-field", "2")):
             self.page.fill(f"{field} input[type=number]", typed)
         self.page.click("#compare-form button[type=submit]")
-        refused = "[...document.querySelectorAll('#setpoint-fields .refusal, #timestep-field .refusal, #compare-form .refusal')].map((one) => one.textContent).filter(Boolean)"
+        refused = ("[...document.querySelectorAll('#setpoint-fields .refusal, #timestep-field .refusal, #compare-form .refusal')]"
+                   ".map((one) => one.textContent).filter(Boolean)")
         self.page.until(f"{refused}.length === 3 && {refused}.every((one) => one.includes('not connected'))")
         # It retries meanwhile and fails, so the messages stay.
         self.page.run("own('store.js').then(({ watch }) => { window.tries = 0; watch('connection', () => { window.tries += 1; }); })")
@@ -67,7 +69,8 @@ class Silent(PageTest):
         self.runtime.process.send_signal(signal.SIGSTOP)
         try:
             began = time.monotonic()
-            self.page.until("document.querySelector('#connection-text').textContent === 'no answer' && document.querySelector('#run-state').textContent === 'no connection'")
+            self.page.until("document.querySelector('#connection-text').textContent === 'no answer' && "
+                "document.querySelector('#run-state').textContent === 'no connection'")
             self.assertLess(time.monotonic() - began, 8)
             self.assertIn("No answer", self.page.text("#course-status"))
         finally:

@@ -6,7 +6,7 @@ import time
 from stage import IS_FILE, PageTest
 from test_layout import CLIPPED, PHONE, audit, forget_the_inspectors
 
-STEPS = ("hold", "slow", "look", "method", "timestep", "limit", "energy", "price", "extreme", "own")
+STEPS = ("hold", "slow", "pid", "look", "method", "timestep", "limit", "energy", "price", "extreme", "own")
 DIAL = "#course-dial input[type=number]"
 
 
@@ -48,9 +48,11 @@ class Tasks(CourseTest):
             self.assertEqual(settings(), before)
 
     def test_holding_ticks_when_the_tip_arrives(self):
-        self.page.run("document.querySelector('input[name=drag][value=setpoint]').click(), document.querySelectorAll('#goal-body input')[4].value = 100")  # as left in the Workbench
+        self.page.run("document.querySelector('input[name=drag][value=setpoint]').click(), document.querySelectorAll('#goal-body "
+            "input')[4].value = 100")  # as left in the Workbench
         self.page.click("#course-start")
-        self.page.until("document.querySelector('#controller').checkVisibility() && document.querySelector('#controller').textContent === 'Controller on'", why="keys may change it")
+        self.page.until("document.querySelector('#controller').checkVisibility() && document.querySelector('#controller').textContent === "
+            "'Controller on'", why="keys may change it")
         self.page.drag(self.on_canvas((1.9, 0.1)), self.on_canvas((0.6, 1.2)))
         self.done("the tip has arrived")
         self.wait(lambda: math.dist(self.runtime.end_effector(), (0.6, 1.2)) < 0.02, "where the drag ended")
@@ -102,7 +104,8 @@ class Tasks(CourseTest):
         self.runtime.call("/arm_sim/set_integrator", method="verlet")
         self.page.until("document.querySelector('#course-caption').textContent.includes('Verlet')")
         self.page.fill(DIAL, "3")
-        self.page.until(f"document.querySelector('#course-dial .refusal').textContent === 'The timestep is 4 ms, because it must divide the control period.' && !document.querySelector('{DIAL}').ariaInvalid")
+        self.page.until(f"document.querySelector('#course-dial .refusal').textContent === 'The timestep is 4 ms, because it must divide the "
+            f"control period.' && !document.querySelector('{DIAL}').ariaInvalid")
         self.assertAlmostEqual(self.values("/pid_controller/set_period")["effective_period"], 0.004, delta=1e-9)
 
     def test_less_damping_makes_the_period_stable(self):
@@ -116,12 +119,15 @@ class Tasks(CourseTest):
 
     def test_the_energy_is_kept_by_another_method(self):
         self.step("energy")
-        self.page.until(r"/^\+\d/.test(document.querySelector('#course-figure').textContent) && document.querySelector('#course-big').classList.contains('bad')", why="Euler gains")
+        self.page.until(r"/^\+\d/.test(document.querySelector('#course-figure').textContent) && "
+            r"document.querySelector('#course-big').classList.contains('bad')", why="Euler gains")
         self.page.fill(DIAL, "40")
         self.page.click("#course-extra [data-method=verlet]")
         self.page.until("own('store.js').then(({ state }) => state.time < 2 && state.integrator.method === 'verlet')", why="a method starts anew")
-        self.page.until("Number(document.querySelector('#course-figure').textContent.replace('\u2212', '-').slice(0, -2)) < -1", why="lost energy is no success")
-        self.assertEqual(self.page.run("[document.querySelector('#course-big').className, document.querySelector('#course-task').className]"), ["course-big bad", ""])
+        self.page.until("Number(document.querySelector('#course-figure').textContent.replace('\u2212', '-').slice(0, -2)) < -1",
+            why="lost energy is no success")
+        self.assertEqual(self.page.run("[document.querySelector('#course-big').className, document.querySelector('#course-task').className]"),
+            ["course-big bad", ""])
         self.page.click("#course-extra [data-method=rk4]")
         self.page.fill(DIAL, "5")
         self.done("a method that keeps it")
@@ -147,6 +153,38 @@ class Tasks(CourseTest):
         self.page.fill(DIAL, "3")
         self.wait(lambda: self.page.run(look)[0] < 0.01 and abs(self.page.run(look)[1] - 0.02) < 0.005, "from the offset")
         self.wait(lambda: self.page.run(look)[0] > 0.01, "and on")
+
+    def test_three_gains_show_a_sag_an_overshoot_windup_and_its_cure(self):
+        def response(*act):
+            """What the next whole response has shown."""
+            act[0](*act[1:])
+            self.page.until("own('store.js').then(({ state }) => state.time < 3)", why="a change starts the move again")
+            self.page.until("document.querySelector('#course-what').textContent.startsWith('overshoot;')", why="a whole response")
+            return self.page.text("#course-status")
+
+        def gain(place, value):
+            self.page.fill(f"#course-dial .field:nth-child({place}) input[type=number]", value)
+
+        def motors(anti_windup):
+            self.page.click(f"#course-extra [data-motors*={anti_windup}]")
+
+        self.step("pid")
+        self.assertIn("Shown: sag", response(gain, 2, "0"))
+        self.assertIn("overshoot", response(gain, 2, "900"))
+        response(gain, 2, "60")
+        self.assertIn("windup", response(motors, "none"))
+        self.assertEqual(self.values("/pid_controller/set_limits")["effort"], [30, 10])
+        self.assertNotEqual(self.page.run("document.querySelector('#course-task').className"), "done")
+        response(motors, "conditional")
+        self.done("a cure")
+        self.keep("pid")
+        self.assertTrue(self.page.run("document.querySelector('#course-steps [data-step=pid]').classList.contains('done')"), "a tick at the number")
+        self.assertIn("done=pid&", self.page.run("own('views.js').then((share) => share.address())"))
+        self.step("method")
+        self.assertEqual(self.values("/pid_controller/set_limits")["effort"], None, "the next scene has no limit")
+        page = self.open("#step=own&done=hold,nonsense")
+        page.until("[...document.querySelectorAll('#course-steps .done')].map((one) => one.dataset.step).join() === 'hold,pid'",
+            why="kept, and carried by a link")
 
     def test_the_browsers_back_leads_to_the_step_before(self):
         self.step("slow")
@@ -178,12 +216,15 @@ class Tasks(CourseTest):
 
     def test_pictures_run_their_scenes(self):
         self.step("extreme")
-        self.assertEqual(self.page.run("[...document.querySelectorAll('.picture')].filter((one) => getComputedStyle(one).opacity === '1').length"), 39, "all can be read")
-        self.assertEqual(self.page.run("[...document.querySelectorAll('.picture')].filter((one) => one.checkVisibility() && !one.disabled).length"), 12, "good ones first")
+        self.assertEqual(self.page.run("[...document.querySelectorAll('.picture')].filter((one) => getComputedStyle(one).opacity === '1').length"), 39,
+            "all can be read")
+        self.assertEqual(self.page.run("[...document.querySelectorAll('.picture')].filter((one) => one.checkVisibility() && !one.disabled).length"),
+            12, "good ones first")
         self.page.click("#scene-S08")
         self.wait(lambda: self.values("/pid_controller/set_gains")["kp"] == [1e6, 1e6], "stiff gains")
         self.page.until("document.querySelector('#course-chart').checkVisibility()")
-        self.wait(lambda: all(self.image("#course-chart").count(self.color(one)) > 100 for one in ("good", "bad")), "the correct motion, and the one that fails")
+        self.wait(lambda: all(self.image("#course-chart").count(self.color(one)) > 100 for one in ("good", "bad")),
+            "the correct motion, and the one that fails")
         self.keep("motions")
         self.page.click("#course-extra summary")
         self.page.click("#scene-S35")
@@ -203,7 +244,7 @@ class Tasks(CourseTest):
         self.page.run("window.old = 1")
         self.page.click("#scene-S01")
         self.page.until("window.old === undefined && document.querySelector('#links')?.value === '3'", why="another arm")
-        self.page.until("document.querySelector('#course-number').textContent === 'Step 9 of 10' && !document.querySelector('#scene-S01').disabled")
+        self.page.until("document.querySelector('#course-number').textContent === 'Step 10 of 11' && !document.querySelector('#scene-S01').disabled")
 
     def test_the_sheet_agrees_with_the_study_and_does_not_change_the_arm(self):
         self.step("own")
@@ -232,10 +273,11 @@ class Tasks(CourseTest):
         self.page.run("location.hash = '#links=3&gravity=4'")
         self.page.until("document.querySelector('#offer').checkVisibility() && document.querySelector('#controls').checkVisibility()")
         self.page.click("#offer button")
-        self.page.until("document.querySelectorAll('#kp-fields input[type=number]').length === 3" if IS_FILE else "document.querySelector('#offer .refusal').textContent.startsWith('Needs 3 links')")
+        self.page.until("document.querySelectorAll('#kp-fields input[type=number]').length === 3" if IS_FILE
+            else "document.querySelector('#offer .refusal').textContent.startsWith('Needs 3 links')")
         self.page.run("location.hash = '#step=6'")
         self.page.until("document.querySelector('#course-title').checkVisibility() && !document.querySelector('#offer').checkVisibility()")
-        self.assertEqual(self.page.text("#course-number"), "Step 6 of 10")
+        self.assertEqual(self.page.text("#course-number"), "Step 7 of 11")
 
     def press(self, selector):
         self.page.run(f"document.querySelector('{selector}').focus()")
@@ -246,7 +288,8 @@ class Tasks(CourseTest):
         self.page.key("-")
         self.assertEqual(self.page.run("document.querySelector('#plot-span').selectedIndex"), span, "hidden plots stay")
         self.press("#course-start")
-        self.page.until("!document.querySelector('#course-dial').inert && own('arm_view.js').then(({ endEffector }) => endEffector().x > 1.99)", why="the scene")
+        self.page.until("!document.querySelector('#course-dial').inert && own('arm_view.js').then(({ endEffector }) => endEffector().x > 1.99)",
+            why="the scene")
         self.page.run("document.querySelector('#arm').focus()")
         for _ in range(4):
             self.page.key("ArrowLeft")
@@ -255,7 +298,8 @@ class Tasks(CourseTest):
         self.press("#course-question button")
         self.page.until("document.activeElement.matches('#course-question .right')", why="an answer keeps the focus")
         self.press("#course-next")
-        self.page.until("document.activeElement.id === 'course-title' && document.querySelector('#course-question button') && !document.querySelector('#course-dial').inert")
+        self.page.until("document.activeElement.id === 'course-title' && document.querySelector('#course-question button') && "
+            "!document.querySelector('#course-dial').inert")
         self.press("#course-question button")
         self.page.until("document.activeElement.closest('#course-dial') !== null", why="after the guess the dial is next")
 
@@ -281,7 +325,8 @@ class Tasks(CourseTest):
     def test_on_its_side_a_phone_shows_the_arm_beside_all_of_the_text(self):
         page = self.open("#step=6", width=844, height=390, touch=True)
         for place in (0, 300):
-            top, bottom = page.run(f"(scrollTo(0, {place}), new Promise(requestAnimationFrame)).then(() => {{ const b = document.querySelector('#arm').getBoundingClientRect(); return [b.top, b.bottom]; }})")
+            top, bottom = page.run(f"(scrollTo(0, {place}), new Promise(requestAnimationFrame)).then(() => "
+                f"{{ const b = document.querySelector('#arm').getBoundingClientRect(); return [b.top, b.bottom]; }})")
             self.assertTrue(0 <= top and bottom <= 390, f"from {top} to {bottom} after {place}")
 
     def test_both_views_show_the_same_arm_and_a_link_names_the_step(self):
@@ -291,7 +336,8 @@ class Tasks(CourseTest):
         link = self.page.run("own('views.js').then((share) => share.address())")
         self.assertIn("#step=limit&links=2", link)
         self.page.click("#view-switch")
-        self.page.until("document.querySelector('#period-field input[type=number]').checkVisibility() && document.querySelector('#period-field input[type=number]').value === '5.5'")
+        self.page.until("document.querySelector('#period-field input[type=number]').checkVisibility() && document.querySelector('#period-field "
+            "input[type=number]').value === '5.5'")
         self.page.click("#view-switch")
         self.page.until("document.querySelector('#course').checkVisibility()")
 

@@ -66,7 +66,8 @@ class BlowUp(PageTest):
         button = self.page.until("[...document.querySelectorAll('#notice button')].find((one) => one.textContent.startsWith('Restart at'))?.textContent")
         self.assertRegex(button, r"^Restart at [\d.]+ ms$")
         self.page.run("""(window.said = "", new MutationObserver(() => { said += document.querySelector('#notice').textContent; })
-            .observe(document.querySelector('#notice'), { childList: true, characterData: true, subtree: true }), document.querySelector('#notice button').focus())""")
+            .observe(document.querySelector('#notice'), { childList: true, characterData: true, subtree: true }),
+            document.querySelector('#notice button').focus())""")
         self.page.key("Enter")
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
         self.page.until("document.querySelector('#verdict-pill').textContent === 'stable'")

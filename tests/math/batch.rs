@@ -56,7 +56,11 @@ fn any_simulation<const N: usize>(rng: &mut Rng) -> Simulation<N> {
         ki: each(|| between(rng, 0.0, 3000.0)),
         kd: each(|| between(rng, 0.0, 100.0)),
     };
-    let mut simulation = Simulation::new(arm.unwrap(), gains);
+    let mut arm = arm.unwrap();
+    if rng.u32(..3) == 0 {
+        arm = arm.with_friction(each(|| between(rng, 0.0, 5.0))).unwrap();
+    }
+    let mut simulation = Simulation::new(arm, gains);
     simulation.set_method(*rng.choice(Method::ALL.iter()).unwrap());
     // The larger ones diverge within some steps.
     simulation.set_timestep(of_any_size(rng, 1e-5, 0.5));

@@ -6,7 +6,7 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::{ControlPeriod, Simulation};
 
 /// Accelerations of two links of 1 m and 1 kg, from the mass matrix of the textbook.
-pub fn textbook(q: [f64; 2], v: [f64; 2], effort: [f64; 2]) -> [f64; 2] {
+pub(crate) fn textbook(q: [f64; 2], v: [f64; 2], effort: [f64; 2]) -> [f64; 2] {
     let (c2, s2) = (q[1].cos(), q[1].sin());
     let (m11, m12, m22) = (5.0 / 3.0 + c2, 1.0 / 3.0 + c2 / 2.0, 1.0 / 3.0);
     let outer = 9.81 * (q[0] + q[1]).cos() / 2.0;
@@ -17,7 +17,7 @@ pub fn textbook(q: [f64; 2], v: [f64; 2], effort: [f64; 2]) -> [f64; 2] {
 }
 
 /// One step of Runge-Kutta 4 under constant efforts and the viscous friction of each joint.
-pub fn rk4(
+pub(crate) fn rk4(
     (q, v): ([f64; 2], [f64; 2]),
     effort: [f64; 2],
     viscous: [f64; 2],

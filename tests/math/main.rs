@@ -20,6 +20,7 @@ mod default_gains;
 mod divergence;
 mod dynamics;
 mod expression;
+mod friction;
 mod goal;
 mod integrators;
 mod kinematics;

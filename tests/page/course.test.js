@@ -9,8 +9,8 @@ import { SCENES, settingsOf } from "../../page/scenes.js";
 
 const words = (text) => text.split(/\s+/).length;
 
-test("ten steps, each with scenes, at most 40 words, and sentences of at most 25", () => {
-  assert.equal(STEPS.length, 10);
+test("eleven steps, each with scenes, at most 40 words, and sentences of at most 25", () => {
+  assert.equal(STEPS.length, 11);
   for (const { id, text, scene } of STEPS) {
     for (const links of [2, 3]) assert.equal(scene(links).gains.kp.length, links, id);
     assert.ok(words(text) <= 40, `${id}: ${words(text)} words`);
@@ -29,7 +29,9 @@ test("every question has one right answer, with the reason", () => {
 });
 
 test("no task is done before anything is done, and each can be", () => {
-  const all = { methods: new Set(["euler", "midpoint", "verlet", "rk4"]), reached: true, shook: true, shrinks: true, gain: 100, stable: true, measured: true, scenes: new Set("123"), energy: { timestep: 0.005, since: 0.01, until: 10, low: -0.05, high: 0.1 }, sheet: true };
+  const all = { methods: new Set(["euler", "midpoint", "verlet", "rk4"]), reached: true, shook: true, shrinks: true, gain: 100, stable: true,
+    measured: true, scenes: new Set("123"), energy: { timestep: 0.005, since: 0.01, until: 10, low: -0.05, high: 0.1 }, sheet: true,
+      responses: { sag: true, overshoot: true, windup: true, cure: true } };
   for (const { id, task } of STEPS) {
     assert.equal(task.done(nothingSeen()), false, id);
     assert.equal(task.done(all), true, id);
@@ -68,8 +70,10 @@ test("a time and its limit have the same unit", () => {
   assert.equal(ofLimit(5, 0), "5 ms, none known as stable");
 });
 
-test("a link names a step by number or by name", () => {
-  assert.deepEqual(["#step=4", "#step=method&links=2", "#step=0", "#step=11", "#step=x", "#links=2", ""].map(stepIn), [3, 3, -1, -1, -1, -1, -1]);
+test("a link names a step by its name, or by its number from before there was a step on PID", () => {
+  const titles = ["#step=4", "#step=method&links=2", "#step=2", "#step=3", "#step=pid", "#step=10"].map((link) => STEPS[stepIn(link)].id);
+  assert.deepEqual(titles, ["method", "method", "slow", "look", "pid", "own"]);
+  assert.deepEqual(["#step=0", "#step=11", "#step=x", "#links=2", ""].map(stepIn), [-1, -1, -1, -1, -1]);
 });
 
 // The scenes, held to the report's source

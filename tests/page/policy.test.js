@@ -18,7 +18,8 @@ function arm(changed = {}) {
     connection: "open", links: 2, enabled: true, setpointKnown: true, setpoint: Float64Array.of(0.9, -1.3, 0),
     position: new Float64Array(3), velocity: new Float64Array(3),
     integrator: { method: "rk4", timestep: 0.001 }, params: { gravity: 9.81, masses: [1, 1], lengths: [1, 1] },
-    gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] }, period: { period: 0, effective_period: 0.001, delay: false }, diagnostics: { state: "running" }, ...changed,
+    gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] }, period: { period: 0, effective_period: 0.001, delay: false },
+      diagnostics: { state: "running" }, ...changed,
   };
   const { answers = { [state.integrator.method]: changed.stability ?? VALUES }, motions = {} } = changed;
   const asked = questionOf(state);
@@ -52,13 +53,21 @@ const served = (changed) => ({ stability: { ...VALUES, ...changed } });
 /** A row: the case, its changed values, and the expected parts of the verdict. */
 const VERDICTS = [
   ["within the limit of every pose", {}, { kind: "stable" }],
-  ["within the limit of this pose alone", at(0.006), { kind: "here", sentence: /at the setpoint \(0\.90, −1\.30\) rad, but other poses are stable only up to 4\.32 ms/, advised: ADVISED }],
+  ["within the limit of this pose alone", at(0.006), {
+     kind: "here", sentence: /at the setpoint \(0\.90, −1\.30\) rad, but other poses are stable only up to 4\.32 ms/, advised: ADVISED }],
   ["beyond the limit", at(0.02), { kind: "beyond", sentence: /20 ms is above .* 13\.6 ms, at the setpoint/ }],
-  ["a motion with a smaller limit than the pose", at(0.006, served({ timestep_limit_motion: 0.004, motion_speed: 12.5, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" })), { kind: "beyond", pill: "beyond the estimated limit", where: /^moving at up to 12\.5 rad\/s$/ }],
-  ["a pose that the arm sags to", served({ equilibrium: [0.5, -1.4], equilibrium_kind: "sagging" }), { where: /^at the pose to which it sags, \(0\.50, −1\.40\) rad$/ }],
-  ["Euler's free swing", { enabled: false, ...served({ timestep_limit_held: 0, advised_timestep: 0, minimum_over_poses_held: 0 }) }, { kind: "never", advised: NaN }],
-  ["nothing that limits", { enabled: false, stability: Object.fromEntries(Object.keys(VALUES).map((key) => [key, null])) }, { kind: "stable", limit: Infinity, sentence: /^No limit was found, / }],
-  ["numbers that overflow without a controller", { enabled: false, ...served({ timestep_limit_held: 0, equilibrium: [-1.57, 0], equilibrium_kind: "unstable" }) }, { sentence: "No stable timestep is known, at (−1.57, 0.00) rad." }],
+  ["a motion with a smaller limit than the pose", at(0.006, served({
+    timestep_limit_motion: 0.004, motion_speed: 12.5, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint",
+  })), { kind: "beyond", pill: "beyond the estimated limit", where: /^moving at up to 12\.5 rad\/s$/ }],
+  ["a pose that the arm sags to", served({ equilibrium: [0.5, -1.4], equilibrium_kind: "sagging" }),
+    { where: /^at the pose to which it sags, \(0\.50, −1\.40\) rad$/ }],
+  ["Euler's free swing", { enabled: false, ...served({ timestep_limit_held: 0, advised_timestep: 0, minimum_over_poses_held: 0 }) },
+    { kind: "never", advised: NaN }],
+  ["nothing that limits", { enabled: false, stability: Object.fromEntries(Object.keys(VALUES).map((key) => [key, null])) },
+    { kind: "stable", limit: Infinity, sentence: /^No limit was found, / }],
+  ["numbers that overflow without a controller",
+    { enabled: false, ...served({ timestep_limit_held: 0, equilibrium: [-1.57, 0], equilibrium_kind: "unstable" }) },
+    { sentence: "No stable timestep is known, at (−1.57, 0.00) rad." }],
   ["an arm that has diverged", { diagnostics: { state: "diverged" } }, { kind: "diverged" }],
 ];
 for (const [name, changed, wanted] of VERDICTS) {
@@ -70,7 +79,8 @@ for (const [name, changed, wanted] of VERDICTS) {
 
 test("beyond the limit, or after divergence, the limit of the pose counts instead of the motion's", () => {
   const thrashing = { ...VALUES, timestep_limit_motion: 1e-150, motion_speed: 5.6e156, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" };
-  for (const changed of [{ integrator: { method: "rk4", timestep: 0.02 } }, { integrator: { method: "rk4", timestep: 0.02 }, diagnostics: { state: "diverged" } }]) {
+  for (const changed of [{ integrator: { method: "rk4", timestep: 0.02 } },
+    { integrator: { method: "rk4", timestep: 0.02 }, diagnostics: { state: "diverged" } }]) {
     const found = limitInForce(arm({ stability: thrashing, motions: { rk4: { limit: 1e-6, speed: 1e6 } }, ...changed }));
     assert.deepEqual([found.limit, found.everyPose], [VALUES.timestep_limit_held, VALUES.minimum_over_poses_held]);
     assert.match(found.where, /^at the setpoint/);
@@ -97,7 +107,8 @@ test("a control period that is too long is unstable, however short the timestep"
   assert.equal(verdict(sampled(0.004)).kind, "stable");
 });
 
-const TWO_CLOCKS = { ...VALUES, timestep_limit: 0.08, timestep_limit_held: 0.08, control_period_limit: 0.104, minimum_over_poses_held: 0.09, timestep_limit_motion: 0.018, motion_speed: 22 };
+const TWO_CLOCKS = { ...VALUES, timestep_limit: 0.08, timestep_limit_held: 0.08, control_period_limit: 0.104, minimum_over_poses_held: 0.09,
+  timestep_limit_motion: 0.018, motion_speed: 22 };
 
 test("the motion limits the timestep, not the control period", () => {
   assert.match(verdict(sampled(0.05, { stability: TWO_CLOCKS })).sentence, /^A control period of 50 ms is within the limit 104 ms, at the setpoint/);
@@ -143,7 +154,8 @@ test("energy drifts only if nothing puts any in", () => {
 
 const FREE = {
   timestep_limit_held: 0.278, timestep_limit: 0.278, timestep_limit_continuous: 0.278, minimum_over_poses_held: 0.278, equilibrium: [-Math.PI / 2, 0],
-  equilibrium_kind: "hanging", critical: { growth_per_step: 2.4, frequency: 1.14, joint: 1 }, timestep_limit_motion: 0.0488, motion_speed: 16.4, advised_timestep: 0.039,
+  equilibrium_kind: "hanging", critical: { growth_per_step: 2.4, frequency: 1.14, joint: 1 }, timestep_limit_motion: 0.0488, motion_speed: 16.4,
+    advised_timestep: 0.039,
 };
 const swing = (method, timestep, changed = {}) => arm({ enabled: false, integrator: { method, timestep }, stability: FREE, ...changed });
 
@@ -186,7 +198,8 @@ test("the motion's first limit is kept, and none of an arm that has diverged", (
 });
 
 test("a button's limit counts the motion, whatever the method", () => {
-  const state = swing("verlet", 0.001, { answers: { verlet: FREE, rk4: { ...FREE, timestep_limit_held: 0.393, timestep_limit: 0.393, timestep_limit_motion: 0.0762 } } });
+  const state = swing("verlet", 0.001, { answers: {
+    verlet: FREE, rk4: { ...FREE, timestep_limit_held: 0.393, timestep_limit: 0.393, timestep_limit_motion: 0.0762 } } });
   assert.deepEqual(["verlet", "rk4", "euler"].map((method) => limitInForce(state, method).limit), [0.0488, 0.0762, NaN]);
   // Midpoint's free swing gains energy slowly at short steps. Euler's does not.
   const grows = { ...FREE, timestep_limit_held: 0, timestep_limit: 0 };
@@ -214,7 +227,10 @@ const SERVED = {
 const ALIKE = { euler: 0.004419, midpoint: 0.004316, verlet: 0.004316, rk4: 0.004316 };
 
 /** The reason with an answer of the study, and each method's limit. */
-const why = (answer, limits, changed = {}) => whyText(arm({ answers: Object.fromEntries(Object.entries(limits).map(([method, limit]) => [method, { ...answer, timestep_limit_held: limit }])), ...changed }));
+const why = (answer, limits, changed = {}) => {
+  const answers = Object.entries(limits).map(([method, limit]) => [method, { ...answer, timestep_limit_held: limit }]);
+  return whyText(arm({ answers: Object.fromEntries(answers), ...changed }));
+};
 
 test("a deviation that flips at every step is named with its joint and its growth", () => {
   const text = why(SERVED, ALIKE);

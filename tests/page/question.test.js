@@ -7,9 +7,9 @@ import { fromRest, loopKey, noGains, questionOf, rolloutArgs, stabilityArgs, wit
 import { DEFAULTS, presentSettings } from "../../page/settings.js";
 
 /** The page's state with these settings and this start. */
-function live({ integrator, params, gains, period, controller, setpoint, start, ...others }) {
+function live({ integrator, params, gains, period, friction, motors, controller, setpoint, start, ...others }) {
   return {
-    links: 2, integrator, params, gains, period, enabled: controller, setpoint: Float64Array.from([...setpoint, 0]), setpointKnown: true,
+    links: 2, integrator, params, gains, period, friction, motors, enabled: controller, setpoint: Float64Array.from([...setpoint, 0]), setpointKnown: true,
     position: Float64Array.from([...start.position, 0]), velocity: Float64Array.from([...start.velocity, 0]), ...others,
   };
 }
@@ -26,7 +26,7 @@ function* variations(value, path = []) {
         yield [copy, name];
       }
     }
-  } else yield [typeof value === "number" ? value + 0.5 : typeof value === "boolean" ? !value : `other ${value}`, path.join(".")];
+  } else yield [value === null ? [1, 1] : typeof value === "number" ? value + 0.5 : typeof value === "boolean" ? !value : `other ${value}`, path.join(".")];
 }
 
 test("each setting of the arm, and its start, is in the question and in both requests", () => {

@@ -461,41 +461,47 @@ fn a_joint_that_only_drifts_limits_nothing() {
 
 // ---- against a simulation, and against the arm ----------------------------------------------------------------------
 
-/// The simulation grows 0.1 % beyond the limit and does not 0.1 % below it, for random robots with full gain matrices,
-/// integrals, damping, springs and delays, and every motion between two runs of the law.
+/// A random robot with full gain matrices, integrals, damping, springs and delays.
+fn random_robot(rng: &mut fastrand::Rng, case: usize) -> Simulated {
+    let n = if case == 20 { 12 } else { 1 + case % 4 };
+    let condition = [1e1, 1e3, 1e8][case % 3];
+    let mut matrix = |scale: f64| definite(rng, n, 10.0).scaled(scale);
+    let (kp, kd, ki) = (matrix(100.0), matrix(20.0), matrix(30.0));
+    let (damping, stiffness) = (matrix(1.0), matrix(50.0));
+    Simulated {
+        mass: definite(rng, n, condition),
+        delay: case / 5 % 3,
+        steps: 1 + case / 7 % 3,
+        ki: if case.is_multiple_of(2) {
+            Matrix::zeros(n)
+        } else {
+            ki
+        },
+        kp,
+        kd,
+        damping,
+        stiffness,
+    }
+}
+
+/// The simulation grows 0.1 % beyond the limit and does not 0.1 % below it, for random robots and every motion between
+/// two runs of the law.
 #[test]
 fn a_simulation_of_the_loop_grows_just_beyond_the_limit() {
     let mut rng = fastrand::Rng::with_seed(11);
     let semi = Between::Explicit(Box::new(Pair::semi_implicit()));
+    let rk4 = explicit(Method::Rk4);
     let motions = [
         Between::Exact,
         semi,
         Between::Implicit,
         explicit(Method::Euler),
-        explicit(Method::Rk4),
+        rk4.clone(),
     ];
     let mut found = 0;
     for case in 0..60 {
-        let n = if case == 20 { 12 } else { 1 + case % 4 };
-        let condition = [1e1, 1e3, 1e8][case % 3];
-        let mut matrix = |scale: f64| definite(&mut rng, n, 10.0).scaled(scale);
-        let (kp, kd, mut ki) = (matrix(100.0), matrix(20.0), matrix(30.0));
-        let (damping, stiffness) = (matrix(1.0), matrix(50.0));
-        if case % 2 == 0 {
-            ki = Matrix::zeros(n);
-        }
+        let simulated = random_robot(&mut rng, case);
         let between = motions[case % motions.len()].clone();
-        let simulated = Simulated {
-            mass: definite(&mut rng, n, condition),
-            delay: case / 5 % 3,
-            // The integrator of the simulation is Runge-Kutta 4 itself only for one small step; so it is the exact one.
-            steps: 1 + case / 7 % 3,
-            kp,
-            kd,
-            ki,
-            damping,
-            stiffness,
-        };
         let held = Given {
             kp: rows(&simulated.kp),
             kd: rows(&simulated.kd),
@@ -503,7 +509,8 @@ fn a_simulation_of_the_loop_grows_just_beyond_the_limit() {
             damping: rows(&simulated.damping),
             stiffness: rows(&simulated.stiffness),
             delay: simulated.delay as u64,
-            steps: if between == explicit(Method::Rk4) {
+            // In many steps Runge-Kutta 4 is exact, as the simulation is.
+            steps: if between == rk4 {
                 50
             } else {
                 simulated.steps as u64
@@ -516,7 +523,10 @@ fn a_simulation_of_the_loop_grows_just_beyond_the_limit() {
             continue;
         }
         found += 1;
-        let told = format!("{case}: {n} joints, {between:?}, limit {limit}");
+        let told = format!(
+            "{case}: {} joints, {between:?}, limit {limit}",
+            held.mass.len()
+        );
         let beyond = radius(simulated.period(&between, 1.001 * limit));
         assert!(beyond > 1.0 + 1e-6, "{told}: {beyond}");
         let below = radius(simulated.period(&between, 0.999 * limit));
@@ -594,18 +604,28 @@ fn the_largest_loop_is_answered() {
 
 // ---- faults ---------------------------------------------------------------------------------------------------------
 
-#[test]
-fn a_wrong_matrix_is_refused_by_name() {
-    let two = || Given {
+fn assert_refused(cases: &[(Given, &str)]) {
+    for (held, expected) in cases {
+        let refused = HeldLoop::try_from(held).unwrap_err().to_string();
+        assert!(refused.contains(expected), "{refused}");
+    }
+}
+
+fn two_joints() -> Given {
+    Given {
         kd: vec![vec![1.0]],
         ..given(vec![vec![1.0, 0.2], vec![0.2, 1.0]])
-    };
-    let mass = |rows: [[f64; 2]; 2]| Given {
-        mass: rows.map(|row| row.to_vec()).to_vec(),
-        ..two()
-    };
-    let joints = |n| given(rows(&Matrix::zeros(n).plus_diagonal(1.0)));
-    let cases = [
+    }
+}
+
+fn joints(n: usize) -> Given {
+    given(rows(&Matrix::zeros(n).plus_diagonal(1.0)))
+}
+
+#[test]
+fn a_wrong_mass_matrix_is_refused_by_name() {
+    let mass = |rows: [[f64; 2]; 2]| given(rows.map(|row| row.to_vec()).to_vec());
+    assert_refused(&[
         (given(vec![]), "M must have 1 to 64 rows, got 0"),
         (joints(65), "M must have 1 to 64 rows, got 65"),
         (
@@ -628,16 +648,21 @@ fn a_wrong_matrix_is_refused_by_name() {
             mass([[1.0, f64::NAN], [0.2, 1.0]]),
             "M must be finite: M[0][1] is NaN",
         ),
+    ]);
+}
+
+#[test]
+fn a_wrong_gain_is_refused_by_name() {
+    let two = two_joints;
+    let three = vec![vec![1.0, 2.0, 3.0]];
+    assert_refused(&[
         (
-            Given {
-                kd: vec![vec![1.0, 2.0, 3.0]],
-                ..two()
-            },
-            "kd must have 2 rows of 2 numbers, as M has rows, or one",
+            Given { kd: three, ..two() },
+            "kd must have 2 rows of 2 numbers, as M has rows, or one number",
         ),
         (
             Given {
-                ki: vec![vec![1.0], vec![1.0]],
+                ki: vec![vec![1.0]; 2],
                 ..two()
             },
             "ki must have 2 rows",
@@ -678,9 +703,5 @@ fn a_wrong_matrix_is_refused_by_name() {
             },
             "the loop must have at most 256 states, got 320",
         ),
-    ];
-    for (held, expected) in cases {
-        let refused = HeldLoop::try_from(&held).unwrap_err().to_string();
-        assert!(refused.contains(expected), "{refused}");
-    }
+    ]);
 }

@@ -79,7 +79,7 @@ fn a_client_that_has_closed_its_socket_waits_for_no_permit_of_a_long_frame() {
     let ways: [&dyn Fn(SocketAddr) -> Client; 2] = [&over_tcp, &over_web];
     for wait in ways {
         let runtime = serving("8");
-        // Each holds a permit for a minute.
+        // Each holds a permit for five seconds.
         let _holders: Vec<Client> = (0..3).map(|_| over_tcp(runtime.address)).collect();
         let waiting: Vec<Client> = (3..7).map(|_| wait(runtime.address)).collect();
         assert!(refused(runtime.address).contains("serves 8 clients"));

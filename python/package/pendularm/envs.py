@@ -13,7 +13,7 @@ import pickle
 import sys
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from typing import Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import gymnasium
 import numpy as np
@@ -33,7 +33,11 @@ __all__ = [
     "PendularmReachEnv",
     "PendularmReachVectorEnv",
     "PendularmVectorEnv",
+    "sb3",
 ]
+
+if TYPE_CHECKING:
+    from .sb3 import Sb3VecEnv
 
 
 T = TypeVar("T")
@@ -277,6 +281,16 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
         self._task.begin(arms, [self._streams[arm][0] for arm in arms])
         self._elapsed[mask] = 0
         self._ended = self._ended & ~mask
+
+
+def sb3(name: str, num_envs: int, **kwargs: Any) -> "Sb3VecEnv":
+    """The environment `name` with `num_envs` arms as a `VecEnv` of stable-baselines3, which needs this package.
+
+    `kwargs` are those of the vector environment, such as `links`, `threads` or `render_mode`.
+    """
+    from .sb3 import Sb3VecEnv
+
+    return Sb3VecEnv(name, num_envs, **kwargs)
 
 
 def _arguments_and_rendering(target: str) -> str:

@@ -13,14 +13,15 @@ pub const MAX_COMPUTATIONS_WAITING: usize = 16;
 pub struct Computations<T> {
     /// Each with the length of its frame \[bytes\].
     waiting: VecDeque<(T, usize)>,
-    is_running: bool,
+    /// The length of the frame of the one that runs.
+    running: Option<usize>,
 }
 
 impl<T> Default for Computations<T> {
     fn default() -> Self {
         Self {
             waiting: VecDeque::new(),
-            is_running: false,
+            running: None,
         }
     }
 }
@@ -33,29 +34,30 @@ impl<T> Computations<T> {
 
     /// The next call, if none runs. It runs from now on.
     pub fn start(&mut self) -> Option<T> {
-        if self.is_running {
+        if self.running.is_some() {
             return None;
         }
-        let (call, _) = self.waiting.pop_front()?;
-        self.is_running = true;
+        let (call, length) = self.waiting.pop_front()?;
+        self.running = Some(length);
         Some(call)
     }
 
     /// The running computation has been answered.
     pub const fn end(&mut self) {
-        self.is_running = false;
+        self.running = None;
     }
 
-    /// Whether too many calls wait, or too many bytes of their frames.
+    /// Whether too many calls wait, or too many bytes of the frames of all.
     #[must_use]
     pub fn is_full(&self) -> bool {
-        let bytes: usize = self.waiting.iter().map(|(_, length)| length).sum();
+        let waiting = self.waiting.iter().map(|(_, length)| *length);
+        let bytes: usize = waiting.chain(self.running).sum();
         self.waiting.len() >= MAX_COMPUTATIONS_WAITING || bytes >= SHORT
     }
 
     /// Whether no computation runs or waits.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        !self.is_running && self.waiting.is_empty()
+        self.running.is_none() && self.waiting.is_empty()
     }
 }

@@ -7,7 +7,7 @@
 use tokio::time::Instant;
 
 use crate::actors::resources::long_work::{SHORT_WORK, WorkKind, run_long_work};
-use crate::actors::resources::memory::{Memory, Permit, SHORT};
+use crate::actors::resources::memory::{LONG_FRAME_TIME, Memory, Permit, SHORT};
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::op::{self, Incoming, Op, OpError, Problem};
 use crate::protocol::wire::fragments::Fragments;
@@ -37,14 +37,22 @@ pub struct LongFrames {
     /// The memory permit of the client's long frame. It is held until the frame was performed and its answers written,
     /// and while pieces of a frame are kept.
     pub permit: Option<Permit>,
+    /// Deadline of the frame that holds the permit.
+    pub due: Option<Instant>,
 }
 
 impl LongFrames {
     /// Releases the memory permit, unless a long frame `is_coming` or pieces of one are kept.
     pub fn give_back(&mut self, is_coming: bool) {
         if !is_coming && self.fragments.allocated() <= SHORT {
-            self.permit = None;
+            (self.permit, self.due) = (None, None);
         }
+    }
+
+    /// Keeps a memory permit for a frame that is still to come.
+    pub fn hold(&mut self, permit: Permit) {
+        self.permit = Some(permit);
+        self.due = Some(Instant::now() + LONG_FRAME_TIME);
     }
 
     /// Reads a frame. A piece of a message is kept, and the last one gives the op of the message.
@@ -97,7 +105,7 @@ impl LongFrames {
     /// Takes the memory permit, unless the client has it.
     async fn take_room(&mut self, memory: &Memory) {
         if self.permit.is_none() {
-            self.permit = Some(memory.long_frame().await);
+            self.hold(memory.long_frame().await);
         }
     }
 }

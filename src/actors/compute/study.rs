@@ -18,8 +18,8 @@ use crate::actors::node::{Call, Nodes, Reply, Unserved};
 use crate::protocol::catalog::Service;
 use crate::services::study::{Computed, Integrating, Work};
 pub use crate::services::study::{
-    IntegrationStep, PlanRun, PlannedRun, PredictStability, Predicted, Ran, Refused, RunOffline,
-    SuggestGains, Suggested,
+    FindHeldLimit, IntegrationStep, PlanRun, PlannedRun, PredictStability, Predicted, Ran, Refused,
+    RunOffline, SuggestGains, Suggested,
 };
 use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
@@ -42,6 +42,7 @@ impl<const N: usize> Study<N> {
     /// Enters this node's services into the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<PredictStability<N>>(Service::Stability, address.clone());
+        nodes.serve::<FindHeldLimit>(Service::HeldLimit, address.clone());
         nodes.serve::<RunOffline<N>>(Service::Rollout, address.clone());
         nodes.serve::<SuggestGains<N>>(Service::SuggestGains, address.clone());
         nodes.serve::<PlanRun<N>>(Service::Plan, address.clone());
@@ -63,11 +64,15 @@ impl<const N: usize, A: Computed<N>> Handler<Call<A>> for Study<N> {
 
     fn handle(&mut self, call: Call<A>, ctx: &mut Context<Self>) {
         let Call { ask, mut reply } = call;
-        let present = self.arm.send(ArmSettings).into_actor(self);
-        ctx.spawn(present.map(move |present, study, _| match present {
-            Ok(present) => answer(&study.workers, reply, ask.work(present)),
-            Err(_) => reply.refuse(Unserved::NO_ARM),
-        }));
+        let present = self.arm.send(ArmSettings);
+        let workers = self.workers.clone();
+        let answered = async move {
+            match present.await {
+                Ok(present) => answer(workers, reply, ask.work(present)).await,
+                Err(_) => reply.refuse(Unserved::NO_ARM),
+            }
+        };
+        ctx.spawn(answered.into_actor(self));
     }
 }
 
@@ -75,8 +80,10 @@ impl<const N: usize, A: Computed<N>> Handler<Call<A>> for Study<N> {
 impl<const N: usize> Handler<Call<IntegrationStep>> for Study<N> {
     type Result = ();
 
-    fn handle(&mut self, call: Call<IntegrationStep>, _: &mut Context<Self>) {
-        answer(&self.workers, call.reply, Integrating::Asked(call.ask));
+    fn handle(&mut self, call: Call<IntegrationStep>, ctx: &mut Context<Self>) {
+        let work = Integrating::Asked(call.ask);
+        let answered = answer(self.workers.clone(), call.reply, work);
+        ctx.spawn(answered.into_actor(self));
     }
 }
 
@@ -85,8 +92,15 @@ impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
 
     fn handle(&mut self, HeldLimit(control): HeldLimit<N>, _: &mut Context<Self>) -> Self::Result {
         let (asker, answered) = oneshot::channel();
-        answer(&self.workers, Reply::new(asker, None), Limiting(control));
-        Box::pin(async move { answered.await.ok()?.ok() })
+        let computing = answer(
+            self.workers.clone(),
+            Reply::new(asker, None),
+            Limiting(control),
+        );
+        Box::pin(async move {
+            computing.await;
+            answered.await.ok()?.ok()
+        })
     }
 }
 

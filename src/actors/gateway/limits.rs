@@ -6,7 +6,9 @@
 use std::time::Duration;
 
 use crate::actors::graph::registrations::MAX_REGISTERED;
-use crate::actors::resources::memory::{LONG_ANSWERS, LONG_FRAMES, MAX_BACKLOG, SHORT};
+use crate::actors::resources::memory::{
+    LONG_ANSWERS, LONG_FRAMES, LONGEST_ANSWER, MAX_BACKLOG, PERMIT_TIME, SHORT,
+};
 use crate::protocol::limits::{DEFAULT_CLIENTS, MAX_FRAME, MEDIUM};
 use crate::protocol::outbox::MAX_TOPIC_BYTES;
 
@@ -14,7 +16,7 @@ const KIB: usize = 1024;
 
 /// Largest resident size of the program with the default number of places \[bytes\]. It excludes the system's socket
 /// buffers.
-pub const MAX_MEMORY: usize = 648 * KIB * KIB;
+pub const MAX_MEMORY: usize = 664 * KIB * KIB;
 /// Most bytes of one client, without long frames and answers. The sum has its input (received bytes and a frame),
 /// the pieces of a message, and topic messages that wait or are being written. Responses and computations count with
 /// one more than may wait. The entries of the registry, a WebSocket's buffers and the idle connection are included.
@@ -36,7 +38,11 @@ pub const LONG_FRAME_BYTES: usize = (4 + MAX_LONG_FORMS) * MAX_FRAME;
 /// Bytes of the program itself.
 const PROGRAM_BYTES: usize = 24 * KIB * KIB;
 const _: () = assert!(
-    DEFAULT_CLIENTS * CLIENT_BYTES + LONG_FRAMES * LONG_FRAME_BYTES + LONG_ANSWERS + PROGRAM_BYTES
+    DEFAULT_CLIENTS * CLIENT_BYTES
+        + LONG_FRAMES * LONG_FRAME_BYTES
+        + LONG_ANSWERS
+        + LONGEST_ANSWER
+        + PROGRAM_BYTES
         <= MAX_MEMORY
 );
 
@@ -53,9 +59,9 @@ pub const HEAD_TIME: Duration = Duration::from_secs(5);
 /// Timeout of a client that has stopped sending and takes no byte of the remaining topic messages. Also the timeout of
 /// the end of the stream.
 pub const LINGER: Duration = Duration::from_secs(5);
-/// A client that takes no byte in this time is disconnected, if responses or a long topic message wait. A long message
-/// occupies shared memory.
-pub const STALL_LIMIT: Duration = Duration::from_secs(20);
+/// A client that takes no byte in this time is disconnected, if responses wait. Bytes that hold a permit have this time
+/// and their length at 1 MiB/s, even if the client takes some of them.
+pub const STALL_LIMIT: Duration = PERMIT_TIME;
 /// Timeout of a frame from its first byte to its last, while the reader waits for the rest. A skipped frame has no
 /// timeout. The slowest line that can control an arm needs less.
 pub const FRAME_TIME: Duration = Duration::from_secs(60);

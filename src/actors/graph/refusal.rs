@@ -4,7 +4,7 @@
 //! or action.
 
 use super::registrations::TooMuchRegistered;
-use crate::actors::resources::memory::MAX_BACKLOG;
+use crate::actors::resources::memory::{MAX_BACKLOG, MAX_LONG_BACKLOG};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::names;
 use crate::protocol::op::{Problem, Served};
@@ -46,9 +46,17 @@ pub(in crate::actors) enum Refusal {
     #[error("the provider of {0} does not read: more than {MAX_BACKLOG} bytes wait for it")]
     ProviderBusy(String),
     #[error(
+        "the provider of {0} does not read: at most {MAX_LONG_BACKLOG} bytes of long calls wait for it; call again later"
+    )]
+    ProviderFull(String),
+    #[error(
         "the answer of {0} was discarded: more than {MAX_BACKLOG} bytes wait for this connection"
     )]
     CallerBusy(String),
+    #[error(
+        "the answer of {0} was discarded: at most {MAX_LONG_BACKLOG} bytes of long answers wait for this connection"
+    )]
+    CallerFull(String),
     #[error("id: no goal of {0} with this id was sent by this connection")]
     NoGoal(String),
     #[error(

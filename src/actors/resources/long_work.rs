@@ -32,7 +32,7 @@ pub enum WorkKind {
     Usual,
     /// The same for more than [`MEDIUM`] bytes. Shorter work has places of its own.
     Long,
-    /// Writes a long list. It keeps its place while it waits for memory for its answer.
+    /// Writes a long list.
     Listing,
 }
 

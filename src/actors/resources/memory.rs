@@ -1,39 +1,107 @@
-//! The memory that clients use: bounded places times a bounded client, and two pools for long frames and answers.
+//! The memory that clients use: bounded places times a bounded client, and three pools for long frames and answers.
 //!
 //! Short bytes have a bound in each connection (`gateway::limits`). An answer longer than [`SHORT`] takes a [`Permit`]
 //! before it is computed, and keeps it until it has been written. A published message longer than [`MEDIUM`], and any
 //! other frame longer than [`SHORT`], takes one while it is read, performed and forwarded. The client waits if no
 //! permit is left. The permit stays with the bytes, and is released with their last copy.
 //!
-//! **Invariant:** bytes longer than [`SHORT`] have a permit, except published messages of at most [`MEDIUM`].
+//! A permit is held for a bounded time, because other clients wait for it ([`time_to_read`]).
+//!
+//! **Invariant:** bytes longer than [`SHORT`] have a permit, except published messages of at most [`MEDIUM`], and the
+//! frames of computations that wait in their own connection.
 
-use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use bytes::Bytes;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use crate::protocol::limits::MEDIUM;
 pub use crate::protocol::limits::SHORT;
+use crate::protocol::limits::{MAX_FRAME, MEDIUM};
 
 const KIB: usize = 1024;
 const MIB: usize = 1024 * KIB;
 
-/// Most long frames at once.
+/// Most long frames that are read or performed at once. Frames that only wait to be written count by their bytes.
 pub const LONG_FRAMES: usize = 3;
-/// Most bytes of long answers at once, finished or being computed: one of a million steps, or many of ten thousand.
-pub const LONG_ANSWERS: usize = 96 * MIB;
+/// Most bytes of long answers at once, finished or being computed. Longer ones have [`LONGEST_ANSWER`].
+pub const LONG_ANSWERS: usize = 16 * MIB;
+/// The bytes for one answer longer than [`LONG_ANSWERS`]: a million steps. The next such answer waits.
+pub const LONGEST_ANSWER: usize = 96 * MIB;
 /// Bytes of short responses that may wait for one client. Above this limit, calls to it as a provider and answers to
 /// its own calls are refused. The client is not read at half of it, but other clients could still send to it.
 pub const MAX_BACKLOG: usize = 2 * SHORT;
-/// The bytes of an answer per permit of the pool.
-const ANSWER_PART: usize = 16 * KIB;
+/// The same for long calls and answers of other clients. The rest of the pool has room for a longest frame.
+pub const MAX_LONG_BACKLOG: usize = 2 * MAX_FRAME;
+const _: () = assert!(MAX_LONG_BACKLOG + MAX_FRAME <= LONG_FRAMES * MAX_FRAME);
+/// Time for which bytes of any length may hold a permit while their client reads nothing.
+pub const PERMIT_TIME: Duration = Duration::from_secs(20);
+/// Timeout of a frame from its permit to its last byte. A longest frame has arrived by then at 1 MiB/s.
+pub const LONG_FRAME_TIME: Duration = Duration::from_secs(5);
+/// Bytes that a client must read per second of further time.
+const READ_RATE: usize = MIB;
+/// Bytes per permit of a semaphore.
+const PART: usize = 16 * KIB;
 
-/// The two pools; clones share them.
+/// Time in which a client must have read bytes that hold a permit, because other clients wait for it: [`PERMIT_TIME`],
+/// and their length at 1 MiB/s.
+#[must_use]
+pub fn time_to_read(bytes: usize) -> Duration {
+    PERMIT_TIME + Duration::from_millis((bytes / (READ_RATE / 1000)) as u64)
+}
+
+/// Bytes of memory that are taken in the order of the requests; clones share them.
+#[derive(Debug, Clone)]
+pub struct Pool {
+    free: Arc<Semaphore>,
+    parts: usize,
+}
+
+impl Pool {
+    /// A pool of this number of bytes.
+    #[must_use]
+    pub fn of(bytes: usize) -> Self {
+        let parts = bytes.div_ceil(PART).max(1);
+        let free = Arc::new(Semaphore::new(parts));
+        Self { free, parts }
+    }
+
+    /// Waits for this number of bytes, or for the whole pool if that is less. Once the pool is closed, it waits no
+    /// more.
+    async fn take(&self, bytes: usize) -> Permit {
+        let taken = Arc::clone(&self.free).acquire_many_owned(self.needed(bytes));
+        Permit::new(taken.await.ok())
+    }
+
+    /// The same, if it is free now.
+    #[must_use]
+    pub fn try_take(&self, bytes: usize) -> Option<Permit> {
+        let taken = Arc::clone(&self.free).try_acquire_many_owned(self.needed(bytes));
+        Some(Permit::new(Some(taken.ok()?)))
+    }
+
+    /// Whether this number of bytes is free.
+    #[must_use]
+    pub fn has(&self, bytes: usize) -> bool {
+        self.free.available_permits() >= bytes.div_ceil(PART)
+    }
+
+    fn needed(&self, bytes: usize) -> u32 {
+        u32::try_from(bytes.div_ceil(PART).min(self.parts)).unwrap_or(u32::MAX)
+    }
+
+    fn taken(&self) -> usize {
+        (self.parts - self.free.available_permits()) * PART
+    }
+}
+
+/// The pools; clones share them.
 #[derive(Debug, Clone)]
 pub struct Memory {
-    frames: Arc<Semaphore>,
-    answers: Arc<Semaphore>,
-    size: (usize, usize),
+    frames: Pool,
+    answers: Pool,
+    longest: Pool,
 }
 
 impl Default for Memory {
@@ -43,52 +111,76 @@ impl Default for Memory {
 }
 
 impl Memory {
-    /// Pools of `frames` long frames and of `answers` bytes of long answers.
+    /// Pools of `frames` longest frames, of `answers` bytes of long answers, and of one longer answer.
     #[must_use]
     pub fn of(frames: usize, answers: usize) -> Self {
-        let size = (frames.max(1), answers.div_ceil(ANSWER_PART).max(1));
         Self {
-            frames: Arc::new(Semaphore::new(size.0)),
-            answers: Arc::new(Semaphore::new(size.1)),
-            size,
+            frames: Pool::of(frames.max(1) * MAX_FRAME),
+            answers: Pool::of(answers),
+            longest: Pool::of(LONGEST_ANSWER),
         }
     }
 
-    /// Waits for the permit for a long frame. Permits are granted in the order of the requests.
+    /// Waits for the permit for a long frame of any length. Permits are granted in the order of the requests.
     pub async fn long_frame(&self) -> Permit {
-        let permit = Arc::clone(&self.frames).acquire_owned().await;
-        Permit::new(permit.ok())
+        self.frames.take(MAX_FRAME).await
     }
 
-    /// The permit for an answer of at most `bytes` bytes, if there is enough memory now. The longest answer fits
-    /// once all others have been written.
-    #[must_use]
-    pub fn answer(&self, bytes: usize) -> Option<Permit> {
-        let parts = bytes.div_ceil(ANSWER_PART).min(self.size.1);
-        let parts = u32::try_from(parts).unwrap_or(u32::MAX);
-        let permit = Arc::clone(&self.answers).try_acquire_many_owned(parts);
-        Some(Permit::new(Some(permit.ok()?)))
+    /// Waits for the permit for an answer of at most `bytes` bytes. Permits are granted in the order of the requests.
+    /// An answer longer than the pool of answers waits only for others of its kind.
+    pub async fn answer(&self, bytes: usize) -> Permit {
+        if bytes.div_ceil(PART) > self.answers.parts {
+            self.longest.take(LONGEST_ANSWER).await
+        } else {
+            self.answers.take(bytes).await
+        }
     }
 
-    /// The number of taken permits of both pools.
+    /// No answer waits from now on, because the runtime is ending.
+    pub fn close(&self) {
+        self.answers.free.close();
+        self.longest.free.close();
+    }
+
+    /// The bytes for which permits are held.
     #[must_use]
     pub fn taken(&self) -> usize {
-        self.size.0 + self.size.1
-            - self.frames.available_permits()
-            - self.answers.available_permits()
+        self.frames.taken() + self.answers.taken() + self.longest.taken()
     }
 }
 
 /// The permit for a long frame or a long answer, until its last clone is dropped.
 #[derive(Debug, Clone)]
-pub struct Permit {
-    _taken: Arc<Option<OwnedSemaphorePermit>>,
+pub struct Permit(Arc<Taken>);
+
+#[derive(Debug)]
+struct Taken {
+    permit: Mutex<Option<OwnedSemaphorePermit>>,
+    /// The bytes that it covers.
+    covered: AtomicUsize,
 }
 
 impl Permit {
     fn new(permit: Option<OwnedSemaphorePermit>) -> Self {
-        let _taken = Arc::new(permit);
-        Self { _taken }
+        Self(Arc::new(Taken {
+            permit: Mutex::new(permit),
+            covered: AtomicUsize::new(0),
+        }))
+    }
+
+    /// Covers this number of further bytes.
+    pub fn add(&self, bytes: usize) {
+        self.0.covered.fetch_add(bytes, Ordering::Relaxed);
+    }
+
+    /// Gives back the part of it that the covered bytes do not need. The frame has been performed, and only these bytes
+    /// are left of it.
+    pub fn trim(&self) {
+        let needed = self.0.covered.load(Ordering::Relaxed).div_ceil(PART);
+        let mut permit = self.0.permit.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(permit) = permit.as_mut() {
+            drop(permit.split(permit.num_permits().saturating_sub(needed)));
+        }
     }
 }
 
@@ -96,10 +188,13 @@ impl Permit {
 #[must_use]
 pub fn cover(permit: Option<&Permit>, bytes: Bytes) -> Bytes {
     match permit.filter(|_| bytes.len() > SHORT) {
-        Some(permit) => Bytes::from_owner(Covered {
-            bytes,
-            _permit: permit.clone(),
-        }),
+        Some(permit) => {
+            permit.add(bytes.len());
+            Bytes::from_owner(Covered {
+                bytes,
+                _permit: permit.clone(),
+            })
+        }
         None => bytes,
     }
 }
@@ -129,27 +224,56 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn an_answer_longer_than_the_pool_has_it_alone() {
-        let memory = Memory::of(1, MIB);
-        let longest = memory.answer(usize::MAX).unwrap();
-        assert!(memory.answer(1).is_none());
-        drop(longest);
-        assert!(memory.answer(1).is_some());
+    fn granted<T>(wait: impl Future<Output = T>) -> (Option<T>, impl Future<Output = T>) {
+        let mut wait = Box::pin(wait);
+        let mut cx = std::task::Context::from_waker(std::task::Waker::noop());
+        let now = match wait.as_mut().poll(&mut cx) {
+            Poll::Ready(permit) => Some(permit),
+            Poll::Pending => None,
+        };
+        (now, wait)
     }
 
     #[test]
-    fn long_frames_wait_for_one_another() {
-        let mut cx = std::task::Context::from_waker(std::task::Waker::noop());
+    fn answers_wait_in_order_and_the_longest_waits_only_for_its_kind() {
         let memory = Memory::of(1, MIB);
-        let mut first = Box::pin(memory.long_frame());
-        let mut second = Box::pin(memory.long_frame());
-        let Poll::Ready(permit) = first.as_mut().poll(&mut cx) else {
-            panic!("there is room");
-        };
-        assert!(second.as_mut().poll(&mut cx).is_pending());
-        drop(permit);
-        assert!(second.as_mut().poll(&mut cx).is_ready());
+        let (half, _) = granted(memory.answer(MIB / 2));
+        let (longest, _) = granted(memory.answer(MIB + 1));
+        assert!(half.is_some() && longest.is_some());
+        let (whole, second) = granted(memory.answer(MIB));
+        let (small, third) = granted(memory.answer(1));
+        assert!(whole.is_none() && small.is_none(), "nothing overtakes");
+        let (another, fourth) = granted(memory.answer(usize::MAX));
+        assert!(another.is_none());
+        drop(half);
+        let (whole, _) = granted(second);
+        drop(longest);
+        assert!(whole.is_some() && granted(fourth).0.is_some());
+        drop(whole);
+        assert!(granted(third).0.is_some());
+        assert_eq!(memory.taken(), 0);
+        let (_all, _) = granted(memory.answer(MIB));
+        let (waits, wait) = granted(memory.answer(MIB));
+        memory.close();
+        assert!(waits.is_none() && granted(wait).0.is_some());
+    }
+
+    #[test]
+    fn long_frames_wait_for_one_another_and_keep_only_the_bytes_that_are_left() {
+        let memory = Memory::of(1, MIB);
+        let (first, _) = granted(memory.long_frame());
+        let (second, wait) = granted(memory.long_frame());
+        assert!(second.is_none());
+        let first = first.expect("there is room");
+        let bytes = cover(Some(&first), vec![0; MIB].into());
+        first.trim();
+        assert_eq!(
+            memory.taken(),
+            MAX_FRAME,
+            "the rest is reserved for the second"
+        );
+        drop((first, bytes));
+        assert!(granted(wait).0.is_some());
         assert_eq!(memory.taken(), 0);
     }
 }

@@ -4,6 +4,7 @@
 //! **Invariant:** nothing here imports a node, so every node can use it.
 
 pub mod gauges;
+pub mod gone;
 pub mod listening;
 pub mod long_work;
 pub mod memory;

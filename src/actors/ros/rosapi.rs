@@ -3,23 +3,21 @@
 //!
 //! **Invariant:** nothing is kept between two questions.
 
-use std::time::Duration;
-
 use actix::prelude::*;
 use bytes::Bytes;
 use serde_json::Value;
-use tokio::time::sleep;
 
 use crate::actors::node::TakeCensus;
 use crate::actors::node::{Address, Answered, Ask, Call, Callable, Nodes};
 use crate::actors::resources::long_work::{WorkKind, WorkPermit};
+use crate::actors::resources::memory::SHORT;
 use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
 use crate::protocol::ros::rosapi::{UnknownType, answer};
 
-/// Pause between two tries to find room for a long list.
-const ROOM_RETRY: Duration = Duration::from_millis(10);
+/// Memory that is reserved for a list before its length is known \[bytes\]. It suffices for a few clients.
+const SHORT_LIST: usize = SHORT / 4;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -75,16 +73,26 @@ impl Handler<Call<AskRosapi>> for RosapiNode {
         let Call { ask, mut reply } = call;
         let registry = self.registry.clone();
         let answered = async move {
-            // Only calls with a permit hold a census, however many calls wait.
-            let Some(place) = WorkPermit::take(WorkKind::Listing).await else {
+            let mut reserved = SHORT_LIST;
+            if !reply.reserve(reserved).await {
                 return;
-            };
-            let census = registry.send(TakeCensus).await.unwrap_or_default();
-            while !reply.reserve(census.most_bytes()) {
-                sleep(ROOM_RETRY).await;
             }
-            let list = move || reply.answer(answer(ask.question, &ask.name, &census));
-            place.perform(list).await;
+            // A call that waits for memory holds neither a place nor a census, so at most as many as there are places
+            // exist. Names may be added during the wait.
+            while let Some(place) = WorkPermit::take(WorkKind::Listing).await {
+                let census = registry.send(TakeCensus).await.unwrap_or_default();
+                let needed = census.most_bytes();
+                if needed <= reserved {
+                    let list = move || reply.answer(answer(ask.question, &ask.name, &census));
+                    place.perform(list).await;
+                    return;
+                }
+                drop((place, census));
+                reserved = needed + needed / 8;
+                if !reply.reserve(reserved).await {
+                    return;
+                }
+            }
         };
         ctx.spawn(answered.into_actor(self));
     }

@@ -209,6 +209,7 @@ mod tests {
                 "/arm_sim/disturb",
                 "/arm_sim/pause",
                 "/arm_sim/reset",
+                "/arm_sim/set_friction",
                 "/arm_sim/set_integrator",
                 "/arm_sim/set_parameters",
                 "/arm_sim/set_params",

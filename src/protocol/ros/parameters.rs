@@ -14,6 +14,8 @@ table! {
         Masses = field_of(Service::SetParams, "masses"),
         /// Lengths of the links \[m\].
         Lengths = field_of(Service::SetParams, "lengths"),
+        /// Viscous friction of the joints \[N m s/rad\].
+        Viscous = field_of(Service::SetFriction, "viscous"),
         /// Proportional gains.
         Kp = field_of(Service::SetGains, "kp"),
         /// Integral gains.

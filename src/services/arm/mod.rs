@@ -6,6 +6,7 @@
 //! **Invariant:** an invalid field never prevents a valid one from taking effect.
 
 mod disturb;
+mod friction;
 mod gains;
 mod integrator;
 mod limits;
@@ -21,6 +22,7 @@ mod time;
 
 pub(crate) use self::disturb::DIVERGED;
 pub use self::disturb::{Disturb, Push};
+pub use self::friction::SetFriction;
 pub use self::gains::SetGains;
 pub use self::integrator::{Integrator, SetIntegrator};
 pub use self::limits::SetLimits;

@@ -8,7 +8,7 @@ use bytes::Bytes;
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
-use super::{SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod};
+use super::{SetFriction, SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod};
 use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, RejectedField, Rejections};
@@ -99,6 +99,8 @@ pub enum ParameterRequest<const N: usize> {
 pub enum ParameterChange<const N: usize> {
     /// Gravity, masses and lengths.
     Params(SetParams<N>),
+    /// Friction.
+    Friction(SetFriction<N>),
     /// Gains.
     Gains(SetGains<N>),
     /// Method and timestep.
@@ -243,6 +245,7 @@ fn change<const N: usize>(
     let fields = &mut Fields::single(service, field, Some(value));
     Ok(match service {
         Service::SetParams => ParameterChange::Params(SetParams::from_fields(fields)),
+        Service::SetFriction => ParameterChange::Friction(SetFriction::from_fields(fields)),
         Service::SetGains => ParameterChange::Gains(SetGains::from_fields(fields)),
         Service::SetLimits => ParameterChange::Limits(SetLimits::from_fields(fields)),
         Service::SetPeriod => ParameterChange::Period(SetPeriod::from_fields(fields)),

@@ -139,7 +139,7 @@ impl TryFrom<&Given> for HeldLoop {
             delay: usize::try_from(delay).unwrap_or_default(),
             steps: u32::try_from(steps).unwrap_or(1),
             between: given.between.clone(),
-            ..Self::new(matrices)?
+            ..Self::new(matrices).map_err(HeldError::NotPositive)?
         };
         held.within(MAX_STATES)
     }

@@ -11,7 +11,7 @@
 //! | an explicit method | the method, by its tableaus |
 //! | implicit in velocity | `(M + h D) Δv = h (u - D v - K x)`, then `Δx = h (v + Δv)` |
 //!
-//! The last one is MuJoCo's: `implicitfast`, and `Euler`, which is implicit in the damping of joints. Without damping it
+//! The last one is `MuJoCo`'s: `implicitfast`, and `Euler`, which is implicit in the damping of joints. Without damping it
 //! is semi-implicit Euler. With exact motion and without `K`, `D`, `Ki` and delay, a joint reverses at every period from
 //! `T = 2 λmin(Kd⁻¹ M)` on.
 //!
@@ -42,6 +42,30 @@ pub enum Between {
     Explicit(Box<Pair>),
     /// Semi-implicit Euler, implicit in the velocity of `D v`.
     Implicit,
+}
+
+impl Between {
+    /// The names of the motions.
+    pub const NAMES: [&str; 7] = [
+        "exact",
+        "semi_implicit",
+        "implicit",
+        "euler",
+        "midpoint",
+        "verlet",
+        "rk4",
+    ];
+
+    /// The motion of one of the [`Between::NAMES`].
+    pub fn named(name: &str) -> Option<Self> {
+        let explicit = |pair| Some(Self::Explicit(Box::new(pair)));
+        match name {
+            "exact" => Some(Self::Exact),
+            "implicit" => Some(Self::Implicit),
+            "semi_implicit" => explicit(Pair::semi_implicit()),
+            _ => explicit(Pair::of(name.parse().ok()?)),
+        }
+    }
 }
 
 /// A robot near a pose, under its law.
@@ -92,8 +116,8 @@ fn transposed(matrix: &Matrix) -> Matrix {
 }
 
 impl HeldLoop {
-    /// A loop without delay, with exact motion.
-    fn new(joints: Matrices) -> Result<Self, HeldError> {
+    /// A loop without delay, with exact motion; or the joint at which the mass matrix is not positive definite.
+    fn new(joints: Matrices) -> Result<Self, usize> {
         let n = joints.mass.size();
         let holds = |&j: &usize| {
             let rows = 0..n;
@@ -106,7 +130,7 @@ impl HeldLoop {
         let (held, mut order): (Vec<usize>, Vec<usize>) = (0..n).partition(holds);
         order.extend(held);
         let ordered = Matrix::from_fn(n, |i, j| joints.mass[(order[i], order[j])]);
-        let inverse = inverse_of_factor(&ordered).map_err(|i| HeldError::NotPositive(order[i]))?;
+        let inverse = inverse_of_factor(&ordered).map_err(|i| order[i])?;
         let mut axes = Matrix::zeros(n);
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
             axes[(order[i], j)] = inverse[(j, i)];
@@ -229,33 +253,7 @@ impl HeldLoop {
                 repeated(&runge_kutta(&flow, EXACT_TERMS, h), h, pieces)
             }
             Between::Explicit(pair) => {
-                let v: Vec<f64> = (0..3 * n * n)
-                    .map(|at| flow(at / (3 * n), at % (3 * n)))
-                    .collect();
-                let (dq, dv) = pair.increment(h, &v, |dq, v| {
-                    // The accelerations, where positions are x + dq, by the columns of the states.
-                    let columns = 3 * n;
-                    let mut a = vec![0.0; n * columns];
-                    for (i, row) in a.chunks_exact_mut(columns).enumerate() {
-                        for (column, a) in row.iter_mut().enumerate() {
-                            *a = unit(column == 2 * n + i);
-                            if column < n {
-                                *a -= stiffness[(i, column)];
-                            }
-                        }
-                        for k in 0..n {
-                            let (held, slowed) = (stiffness[(i, k)], damping[(i, k)]);
-                            if held == 0.0 && slowed == 0.0 {
-                                continue;
-                            }
-                            for (column, a) in row.iter_mut().enumerate() {
-                                let at = k * columns + column;
-                                *a -= held * dq[at] + slowed * v[at];
-                            }
-                        }
-                    }
-                    a
-                });
+                let (dq, dv) = explicit_step(pair, h, &stiffness, &damping);
                 let step = filled(&|row, column| match row.checked_sub(n) {
                     None => dq[row * 3 * n + column] / h,
                     Some(i) => dv[i * 3 * n + column] / h,
@@ -349,6 +347,40 @@ impl HeldLoop {
         let late = u32::try_from(self.delay).map_or(f64::INFINITY, f64::from);
         late + 1.0 - one.plant(1.0)[(0, 2)]
     }
+}
+
+/// The changes of positions and velocities in a step of a method: rows of n joints, columns of 3 n states.
+fn explicit_step(
+    pair: &Pair,
+    h: f64,
+    stiffness: &Matrix,
+    damping: &Matrix,
+) -> (Vec<f64>, Vec<f64>) {
+    let n = stiffness.size();
+    let columns = 3 * n;
+    // One row for each joint: its position, velocity or effort at the start of the step.
+    let start = |block: usize| {
+        let mut rows = vec![0.0; n * columns];
+        let own = rows.iter_mut().skip(block * n).step_by(columns + 1);
+        own.take(n).for_each(|it| *it = 1.0);
+        rows
+    };
+    let (x, efforts) = (start(0), start(2));
+    pair.increment(h, &start(1), |dq, v| {
+        let mut rates = efforts.clone();
+        for (i, row) in rates.chunks_exact_mut(columns).enumerate() {
+            for k in 0..n {
+                let (held, slowed) = (stiffness[(i, k)], damping[(i, k)]);
+                if held == 0.0 && slowed == 0.0 {
+                    continue;
+                }
+                for (rate, at) in row.iter_mut().zip(k * columns..) {
+                    *rate -= held * (x[at] + dq[at]) + slowed * v[at];
+                }
+            }
+        }
+        rates
+    })
 }
 
 /// The inverse of the lower factor of a Cholesky factorisation, or the row at which it fails.

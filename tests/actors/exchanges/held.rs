@@ -8,6 +8,7 @@ use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::node::{Caller, ServiceCall};
 use pendularm::actors::resources::memory::Memory;
 use pendularm::protocol::catalog::Service;
+use pendularm::protocol::limits::MAX_FRAME;
 use serde_json::Value;
 
 use super::patterns::{expand, range};
@@ -46,7 +47,7 @@ impl KeptCalls {
         let count = match what {
             "connections" => gauges.connections() as usize,
             "dropped" => gauges.messages_dropped() as usize,
-            "taken" => gauges.memory().taken(),
+            "taken" => gauges.memory().taken().div_ceil(MAX_FRAME),
             "steps" => self.steps.borrow().len(),
             _ => self.params.borrow().len(),
         };

@@ -33,7 +33,7 @@
 //! | `held`, `memory frames bytes` | as a first step: in place of all nodes there are two that keep their calls, `steps` of `/arm_sim/integration_step` and `params` of `/arm_sim/set_params`; with `memory`, all clients share this memory |
 //! | `steps = 1`, `params = 1` | this many calls are kept |
 //! | `answer steps json` | the oldest of them succeeds with these values, or with none, and ends; `reply` leaves it open until `release`, `refuse steps why` refuses it, `lose steps` drops it, and `gone steps` drops it if its client has left |
-//! | `connections = 1`, `dropped = 1`, `taken = 1` | clients that are served, messages that were dropped, permits for long frames that are taken |
+//! | `connections = 1`, `dropped = 1`, `taken = 1` | clients that are served, messages that were dropped, memory for long frames and answers that is taken, in whole frames of 4 MiB |
 //! | `workers busy`, `workers full`, `workers free` | from here on all threads for long frames and for lists are occupied, or those for medium ones too, or none |
 //! | `shutting down`, `finish all` | the two messages by which the runtime ends its clients |
 //! | `floating` | gravity and gains are zero and the controller is on: an arm at rest stays where it is |

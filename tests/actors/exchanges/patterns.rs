@@ -10,7 +10,7 @@ use pendularm::actors::gateway::limits::{
     RESPONSES_TIME, STALL_LIMIT,
 };
 use pendularm::actors::graph::registrations::{ENTRY_BYTES, MAX_REGISTERED};
-use pendularm::actors::resources::memory::MAX_BACKLOG;
+use pendularm::actors::resources::memory::{LONG_FRAME_TIME, MAX_BACKLOG, MAX_LONG_BACKLOG};
 use pendularm::actors::resources::places::{KEPT_PLACES, MAX_NEWCOMERS};
 use pendularm::actors::ros::tf_web::{MAX_FRAME_SUBSCRIPTIONS, MAX_FRAMES};
 use pendularm::options::DEFAULT_CLIENTS;
@@ -37,10 +37,12 @@ const LIMITS: &[(&str, usize)] = &[
     ("ENTRIES_OF_1000", MAX_REGISTERED / (ENTRY_BYTES + 3 * 1000)),
     ("KEPT_PLACES", KEPT_PLACES),
     ("LINGER", ms(LINGER)),
+    ("LONG_FRAME_TIME", ms(LONG_FRAME_TIME)),
     ("MAX_COMPUTATIONS_WAITING", MAX_COMPUTATIONS_WAITING),
     ("MAX_AUTH_BYTES", MAX_AUTH_BYTES),
     ("MAX_BACKLOG", MAX_BACKLOG),
     ("MAX_FRAME", MAX_FRAME),
+    ("MAX_LONG_BACKLOG", MAX_LONG_BACKLOG),
     ("MAX_FRAMES", MAX_FRAMES),
     #[cfg(feature = "web")]
     ("MAX_HEAD", MAX_HEAD),

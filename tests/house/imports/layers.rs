@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::arrows::{PENDULARM, SourceTree};
 
 /// Layers that a layer may import, besides itself. A row names only rows above it.
-const LAYERS: [(&str, &[&str]); 20] = [
+const LAYERS: [(&str, &[&str]); 21] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
@@ -24,6 +24,7 @@ const LAYERS: [(&str, &[&str]); 20] = [
         &["protocol", "output", "address", "value", "signals"],
     ),
     ("plan", &["math", "study", "value"]),
+    ("score", &["math"]),
     ("referee", &["output", "value", "signals"]),
     (
         "options",
@@ -43,8 +44,8 @@ const LAYERS: [(&str, &[&str]); 20] = [
     (
         "main",
         &[
-            "command", "logging", "output", "record", "report", "options", "plan", "actors",
-            "signals", "referee",
+            "command", "logging", "output", "record", "report", "options", "plan", "score",
+            "actors", "signals", "referee",
         ],
     ),
 ];

@@ -1,13 +1,16 @@
 //! The report's folder: the files served from it, and that no path leads out of it.
 
 use std::fs;
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
 #[cfg(unix)]
 use std::process::Command;
+use std::time::{Duration, Instant};
 
 use crate::common::Runtime;
 use crate::folder::Folder;
 use crate::web_client::get;
-use pendularm::web::report::MAX_FILE;
+use pendularm::web::report::{FILES, MAX_FILE};
 
 #[test]
 fn the_report_is_served_from_its_folder_with_a_policy_of_its_own() {
@@ -45,6 +48,45 @@ fn the_report_is_served_from_its_folder_with_a_policy_of_its_own() {
         (moved.status, moved.header("location")),
         (301, Some("/report/"))
     );
+}
+
+#[test]
+fn readers_of_the_report_that_read_nothing_do_not_delay_the_page() {
+    let folder = Folder::new("unread");
+    fs::write(folder.join("index.html"), "<h1>report</h1>").unwrap();
+    let long = fs::File::create(folder.join("long.csv")).unwrap();
+    long.set_len(MAX_FILE).unwrap();
+    let runtime = Runtime::with(&["--report", folder.to_str().unwrap()]);
+    let link = "href=\"report/\" hidden";
+    assert!(!get(runtime.address, "/").text().contains(link));
+    let readers: Vec<TcpStream> = (0..2 * FILES)
+        .map(|_| {
+            let mut stream = TcpStream::connect(runtime.address).unwrap();
+            let request = format!(
+                "GET /report/long.csv HTTP/1.1\r\nHost: {}\r\n\r\n",
+                runtime.address
+            );
+            stream.write_all(request.as_bytes()).unwrap();
+            stream
+        })
+        .collect();
+    let mut begin = [0; 12];
+    readers
+        .iter()
+        .take(1)
+        .for_each(|mut first| first.read_exact(&mut begin).unwrap());
+    assert_eq!(&begin, b"HTTP/1.1 200");
+    // Without a free permit the page has no link to the report.
+    let deadline = Instant::now() + Duration::from_secs(10);
+    loop {
+        let began = Instant::now();
+        let page = get(runtime.address, "/");
+        assert!(page.status == 200 && began.elapsed() < Duration::from_secs(5));
+        if page.text().contains(link) {
+            break;
+        }
+        assert!(began < deadline, "all permits are taken");
+    }
 }
 
 /// Paths below `/report/` that lead to no file of the report.

@@ -19,16 +19,12 @@ use crate::actors::resources::work_clock;
 /// Longest time of one computation on a worker before the next one. It is short compared with the 5 ms by which a
 /// client may be delayed, and long compared with the cost of switching.
 pub const SLICE: Duration = Duration::from_millis(1);
-/// Pause between two tries while no computation can begin.
-const TRY_AGAIN: Duration = Duration::from_millis(10);
 
 /// The state of a computation after a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
     /// It waits for its next turn.
     Unfinished,
-    /// It cannot begin yet, and tries again at its next turn.
-    Waiting,
     /// It has sent its answer and can be dropped.
     Finished,
 }
@@ -56,8 +52,6 @@ struct Queue {
     /// Computations that wait for their next slice.
     ready: VecDeque<Job>,
     running: usize,
-    /// Turns in a row in which a computation could not begin.
-    stalled: usize,
     closed: Option<&'static str>,
 }
 
@@ -113,7 +107,6 @@ impl WorkerPool {
         let mut queue = self.lock();
         let Some(why) = queue.closed else {
             queue.ready.push_back(computation);
-            queue.stalled = 0;
             return self.shared.1.notify_one();
         };
         drop(queue);
@@ -153,17 +146,11 @@ impl WorkerPool {
             if queue.closed.is_some() {
                 return None;
             }
-            queue = if queue.ready.is_empty() {
-                let woken = self.shared.1.wait(queue);
-                woken.unwrap_or_else(PoisonError::into_inner)
-            } else if queue.stalled < queue.ready.len() {
-                return queue.next();
-            } else {
-                let woken = self.shared.1.wait_timeout(queue, TRY_AGAIN);
-                let (mut queue, _) = woken.unwrap_or_else(PoisonError::into_inner);
-                queue.stalled = 0;
-                queue
-            };
+            if let Some(job) = queue.next() {
+                return Some(job);
+            }
+            let woken = self.shared.1.wait(queue);
+            queue = woken.unwrap_or_else(PoisonError::into_inner);
         }
     }
 
@@ -180,8 +167,6 @@ impl WorkerPool {
                 (Progress::Finished, _) => None,
                 (_, Some(why)) => Some(why),
                 (_, None) => {
-                    let is_stalled = progress == Progress::Waiting;
-                    queue.stalled = if is_stalled { queue.stalled + 1 } else { 0 };
                     queue.running -= 1;
                     return queue.ready.push_back(job);
                 }
@@ -194,7 +179,6 @@ impl WorkerPool {
         }
         let mut queue = self.lock();
         queue.running -= 1;
-        queue.stalled = 0;
         self.shared.1.notify_all();
     }
 }

@@ -41,68 +41,11 @@ fn computation(
     })
 }
 
-/// Finds no room a few times.
-struct InitiallyFull {
-    tries: usize,
-    began: mpsc::Sender<()>,
-}
-
-impl Computation for InitiallyFull {
-    fn advance(&mut self, _: Duration) -> Progress {
-        if self.tries > 0 {
-            self.tries -= 1;
-            return Progress::Waiting;
-        }
-        let _ = self.began.send(());
-        Progress::Finished
-    }
-
-    fn refuse(&mut self, _why: &'static str) {}
-}
-
-/// Continues until the others are done.
-struct Endless(mpsc::Receiver<()>);
-
-impl Computation for Endless {
-    fn advance(&mut self, _: Duration) -> Progress {
-        match self.0.try_recv() {
-            Err(mpsc::TryRecvError::Empty) => Progress::Unfinished,
-            _ => Progress::Finished,
-        }
-    }
-
-    fn refuse(&mut self, _why: &'static str) {}
-}
-
 /// A worker counts its computation as ended after it has dropped it, so the pool may be idle a moment later.
 fn wait_until_idle(pool: &WorkerPool) {
     while !pool.is_idle() {
         thread::yield_now();
     }
-}
-
-#[test]
-fn a_task_waiting_for_memory_retries_while_others_compute() {
-    let pool = WorkerPool::start(1).unwrap();
-    let (done, endless) = mpsc::channel();
-    let (began, seen) = mpsc::channel();
-    pool.submit(Box::new(Endless(endless)));
-    let full = || {
-        Box::new(InitiallyFull {
-            tries: 3,
-            began: began.clone(),
-        })
-    };
-    pool.submit(full());
-    seen.recv_timeout(Duration::from_secs(60))
-        .expect("room is looked for again");
-    drop(done);
-    wait_until_idle(&pool);
-    // Alone it tries again after a pause.
-    let since = std::time::Instant::now();
-    pool.submit(full());
-    seen.recv().unwrap();
-    assert!(since.elapsed() >= 3 * TRY_AGAIN);
 }
 
 #[test]

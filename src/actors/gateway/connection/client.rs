@@ -5,12 +5,13 @@
 //! socket in the same turn.
 //!
 //! **Invariant:** a write that the client does not take blocks only this connection, and only until a deadline. The
-//! deadline expires only for a client that is finishing, or for which responses or a long message have waited without a
-//! break. One poll writes a bounded number of bytes.
+//! deadline expires only for a client that is finishing, for which responses have waited without a break, or which takes
+//! too long for bytes that hold a permit. One poll writes a bounded number of bytes.
 
+use std::collections::VecDeque;
 use std::pin::Pin;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Weak};
 use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
@@ -20,15 +21,15 @@ use tokio::time::Instant;
 use super::session::HeldPlace;
 use super::transport::{ClientLost, ClientStream, Transport};
 use crate::actors::compute::computations::Computations;
-use crate::actors::gateway::limits::{
-    MAX_RESPONSES_WAITING, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES,
-};
+use crate::actors::gateway::limits::{MAX_RESPONSES_WAITING, WRITE_BYTES, WRITE_FRAMES};
 use crate::actors::gateway::registry::{Registry, Request, ToClient};
 use crate::actors::panics::contain;
 use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::gone::Gone;
 use crate::actors::resources::turns::{Timer, end_turn};
 use crate::actors::resources::unread::Ends;
 use crate::protocol::catalog::Service;
+use crate::protocol::limits::{MEDIUM, SHORT};
 use crate::protocol::outbox::flow::{FlowControl, UnreadSource};
 use crate::protocol::outbox::{Outbox, Room};
 
@@ -51,11 +52,13 @@ pub struct Connection<S> {
     /// Bytes of short responses that wait to be written, in the mailbox or the outbox. The registry reads it.
     pub(super) backlog: Arc<AtomicUsize>,
     /// Set when the client has left. The nodes read it.
-    pub(super) gone: Arc<AtomicBool>,
+    pub(super) gone: Gone,
     /// Time when the frames being written left the outbox, or when the client last took bytes of them.
     pub(super) progress: Instant,
     /// Start of the time in which responses have waited without a break.
     pub(super) responses_since: Option<Instant>,
+    /// Frames that hold a permit of a pool: the deadline of each, and whether any byte of it is left.
+    pub(super) permitted: VecDeque<(Instant, Weak<()>)>,
     /// Its heavy calls.
     pub(super) computations: Computations<Request>,
     /// Set when nothing more is read. Queued messages are still sent.
@@ -86,9 +89,10 @@ impl<S: ClientStream> Connection<S> {
             flow: FlowControl::new(unread, now.into_std()),
             is_single: false,
             backlog: Arc::default(),
-            gone: Arc::default(),
+            gone: Gone::default(),
             progress: now,
             responses_since: None,
+            permitted: VecDeque::new(),
             computations: Computations::default(),
             is_finishing: false,
             is_refused: false,
@@ -107,6 +111,7 @@ impl<S: ClientStream> Connection<S> {
     fn accept(&mut self, message: ToClient) {
         match message {
             ToClient::Deliver { topic, frame, at } => {
+                let frame = self.limit_time(frame, MEDIUM);
                 self.counting_dropped(|outbox| match &topic {
                     Some(topic) => outbox.push(topic, frame, at.into_std()),
                     None => outbox.push_feedback(frame, at.into_std()),
@@ -134,6 +139,7 @@ impl<S: ClientStream> Connection<S> {
     /// Adds a response or a status. Discards held-back messages on `superseded` topics, because they are older.
     pub(super) fn push_response(&mut self, frame: Bytes, superseded: &[&'static str]) {
         self.responses_since.get_or_insert_with(Instant::now);
+        let frame = self.limit_time(frame, SHORT);
         self.outbox.push_response(frame, superseded);
     }
 
@@ -258,19 +264,19 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientWriter {
             } else if is_done {
                 return self.poll_end(client, ctx, cx);
             } else {
-                let is_gone = matches!(transport.poll_flush(cx), Poll::Ready(Err(_)));
-                // It has read nothing for too long while a long message waits.
-                let is_stuck = client.flow.age() > STALL_LIMIT && client.outbox.has_long();
-                if is_gone || is_stuck {
+                if matches!(transport.poll_flush(cx), Poll::Ready(Err(_))) {
                     return client.end_writer(false, ctx);
                 }
-                (None, client.next_release())
+                (client.permit_deadline(), client.next_release())
             };
-            ready!(self.timer.poll(deadline.or(release), cx));
-            if deadline.is_some() {
+            ready!(
+                self.timer
+                    .poll(deadline.into_iter().chain(release).min(), cx)
+            );
+            now = Instant::now();
+            if deadline.is_some_and(|due| due <= now) {
                 return client.end_writer(false, ctx);
             }
-            now = Instant::now();
         }
     }
 }

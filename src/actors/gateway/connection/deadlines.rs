@@ -3,6 +3,7 @@
 //! **Invariant:** the waits for the rest of a frame, for a client that reads nothing, and for the end of its stream
 //! have deadlines.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::task::{self, Poll, ready};
 
@@ -14,18 +15,29 @@ use super::client::{ClientWriter, Connection};
 use super::reader::{ClientReader, ReadStep, effect};
 use super::transport::{ClientLost, ClientStream};
 use crate::actors::compute::computations::Computations;
+use crate::actors::compute::long_frames::LongFrames;
 use crate::actors::gateway::limits::{
     DISCARD_BYTES, DISCARD_TIME, FRAME_TIME, LINGER, LOOK_AGAIN, READ_BYTES, RESPONSES_TIME,
     STALL_LIMIT,
 };
-use crate::actors::gateway::registry::Retire;
+use crate::actors::gateway::registry::{Request, Retire};
+use crate::actors::resources::gone::Gone;
+use crate::actors::resources::memory::time_to_read;
 use crate::actors::resources::turns::end_turn;
-use crate::actors::resources::unread::closed;
+use crate::actors::resources::unread::{Ends, closed};
+use crate::protocol::limits::MEDIUM;
 use crate::protocol::messages::{self, Level};
+use crate::protocol::op::{CallService, Op, OpError, Problem};
 use crate::protocol::wire::fragments::MAX_AGE;
 
 /// The error for a frame that takes longer than [`FRAME_TIME`].
 const TOO_SLOW: &str = "a frame that has begun must be complete within a minute";
+/// The error for a long frame that takes longer than [`LONG_FRAME_TIME`](crate::actors::resources::memory::LONG_FRAME_TIME).
+const TOO_SLOW_LONG: &str = "the rest of a frame of more than 272 KiB must arrive within 5 s";
+
+/// The error for a long formula behind other computations of its client.
+const TOO_LONG: &str = "a computation of more than 272 KiB waits at most 20 s for earlier ones of its connection; \
+                        call again once they have been answered";
 
 impl ClientReader {
     /// Waits for the memory permit of the incoming long frame.
@@ -55,16 +67,37 @@ impl ClientReader {
             let late = is_unfinished.then(|| *self.frame_due.get_or_insert_with(begin));
             let began = self.long.fragments.began().map(Instant::from_std);
             let old = began.map(|began| began + MAX_AGE + LOOK_AGAIN);
-            ready!(self.timer.poll(late.into_iter().chain(old).min(), cx));
+            let first = late.into_iter().chain(old).chain(self.long.due).min();
+            ready!(self.timer.poll(first, cx));
             let now = Instant::now();
             if late.is_some_and(|late| late <= now) {
                 transport.give_up(TOO_SLOW)?;
                 client.refuse(TOO_SLOW);
                 return Poll::Ready(Ok(()));
             }
+            if self.long.due.is_some_and(|due| due <= now) {
+                return Poll::Ready(self.release_late(client));
+            }
             self.long.fragments.forget_old(now.into_std());
             self.long.give_back(transport.is_long_coming());
         }
+    }
+
+    /// Releases the permit of a client that has held it for too long. The client is refused if a long frame is incomplete.
+    /// Pieces of a frame are dropped.
+    fn release_late<S: ClientStream>(
+        &mut self,
+        client: &mut Connection<S>,
+    ) -> Result<(), ClientLost> {
+        let transport = client.transport()?;
+        let is_coming = transport.is_long_coming();
+        self.long = LongFrames::default();
+        if is_coming {
+            transport.give_up(TOO_SLOW_LONG)?;
+            client.refuse(TOO_SLOW_LONG);
+            return Err(ClientLost::Refused);
+        }
+        Ok(())
     }
 
     /// Waits until enough was written and computed that the client may be read. Meanwhile reads up to [`READ_BYTES`]
@@ -81,10 +114,16 @@ impl ClientReader {
                 let begin = || (Instant::now(), Box::pin(closed(client.ends)) as _);
                 let (since, closed) = self.blocked.get_or_insert_with(begin);
                 let due = client.progress.max(*since) + RESPONSES_TIME;
+                // The rest of a long frame will not come.
+                self.long = LongFrames::default();
                 if closed.as_mut().poll(cx).is_pending() {
                     ready!(self.timer.poll(Some(due), cx));
                 }
                 return Poll::Ready(Err(ClientLost::Gone));
+            }
+            if self.timer.poll(self.long.due, cx).is_ready() {
+                self.release_late(client)?;
+                continue;
             }
             let transport = client.transport()?;
             if self.chunk.len() + transport.taken_ahead() >= READ_BYTES {
@@ -106,23 +145,76 @@ impl ClientReader {
     }
 
     /// Withdraws the client's registrations, because it can no longer answer calls.
-    pub(super) fn retire<S: ClientStream>(&self, client: &Connection<S>) -> ReadStep {
+    pub(super) fn retire<S: ClientStream>(&mut self, client: &Connection<S>) -> ReadStep {
+        self.long = LongFrames::default();
         let retired = client.registry.send(Retire(self.id));
         let gone = timeout(RESPONSES_TIME, closed(client.ends));
         let gone = async move { gone.await.unwrap_or_default() };
         ReadStep::Retiring(Some(Box::pin(effect(retired))), Box::pin(gone))
     }
+
+    /// Queues a computation of this connection. Its frame needs no permit there up to [`MEDIUM`], because a connection that
+    /// waits for it reads no other frame. A longer one keeps the permit, so it must begin until `due`.
+    pub(super) fn queue<S: ClientStream>(
+        client: &mut Connection<S>,
+        mut request: Request,
+        length: usize,
+        due: Instant,
+    ) -> ReadStep {
+        if length <= MEDIUM {
+            request.permit = None;
+        } else if !client.computations.is_empty() && Instant::now() < due {
+            return ReadStep::AwaitingTurn(Some(Box::new(request)), length, due);
+        } else if let Ok(Op::CallService(CallService { service, .. })) = &request.incoming.op
+            && !client.computations.is_empty()
+        {
+            let (service, problem) = (service.clone(), Problem::NotAFrame(TOO_LONG.to_owned()));
+            request.incoming.op = Err(OpError::Call { service, problem });
+            return ReadStep::Performing(Box::pin(effect(client.registry.send(request))));
+        }
+        client.computations.push(request, length);
+        client.start_computation();
+        ReadStep::Cutting
+    }
+}
+
+/// Waits until an op has taken effect that may wait for memory, since nothing is read meanwhile. If the client has closed
+/// its socket, the op is told, and its effect is not waited for.
+pub(super) async fn unless_closed(effect: impl Future<Output = ()>, gone: Gone, ends: Ends) {
+    tokio::select! {
+        biased;
+        () = effect => {}
+        () = closed(ends) => gone.set(),
+    }
 }
 
 impl<S: ClientStream> Connection<S> {
-    /// The deadline of a client that takes no byte of a write. `None` if no response or long message waits, unless it
-    /// is finishing.
-    pub(super) fn stall_deadline(&self) -> Option<Instant> {
-        match self.responses_since {
+    /// The deadline of a client that does not take a write. `None` if no response and no bytes with a permit wait,
+    /// unless it is finishing.
+    pub(super) fn stall_deadline(&mut self) -> Option<Instant> {
+        let stalled = match self.responses_since {
             Some(since) => Some(since.max(self.progress) + STALL_LIMIT),
-            None if self.is_finishing => Some(self.progress + LINGER),
-            None => self.outbox.has_long().then(|| self.progress + STALL_LIMIT),
+            None => self.is_finishing.then(|| self.progress + LINGER),
+        };
+        stalled.into_iter().chain(self.permit_deadline()).min()
+    }
+
+    /// The earliest deadline of the waiting bytes that hold a permit.
+    pub(super) fn permit_deadline(&mut self) -> Option<Instant> {
+        self.permitted.retain(|(_, left)| left.strong_count() > 0);
+        self.permitted.iter().map(|(due, _)| *due).min()
+    }
+
+    /// Notes the deadline of a frame that holds a permit, because it has more than `most` bytes.
+    pub(super) fn limit_time(&mut self, frame: Bytes, most: usize) -> Bytes {
+        if frame.len() <= most {
+            return frame;
         }
+        self.permit_deadline();
+        let left = Arc::new(());
+        let due = Instant::now() + time_to_read(frame.len());
+        self.permitted.push_back((due, Arc::downgrade(&left)));
+        Bytes::from_owner(Limited(frame, left))
     }
 
     /// The earliest time of the next write, if nothing can be written now. Either a message is throttled, or the client
@@ -159,7 +251,7 @@ impl<S: ClientStream> Connection<S> {
     /// The client is not served any more. Its output remains to be written, but it no longer waits for computations.
     pub(super) fn leave(&mut self) {
         self.computations = Computations::default();
-        self.gone.store(true, Ordering::Relaxed);
+        self.gone.set();
         self.is_finishing = true;
     }
 
@@ -178,6 +270,18 @@ impl<S: ClientStream> Connection<S> {
             return Poll::Ready(());
         }
         end_turn(cx)
+    }
+}
+
+/// A frame whose client has a deadline, until its last byte is written or dropped.
+struct Limited(
+    Bytes,
+    #[expect(dead_code, reason = "it is dropped with the frame")] Arc<()>,
+);
+
+impl AsRef<[u8]> for Limited {
+    fn as_ref(&self) -> &[u8] {
+        &self.0
     }
 }
 

@@ -68,7 +68,7 @@ impl<S: ClientStream> Connection<S> {
             let outlets = Outlets {
                 mailbox: ctx.address().recipient(),
                 backlog: Arc::clone(&connection.backlog),
-                gone: Arc::clone(&connection.gone),
+                gone: connection.gone.clone(),
             };
             let session = ClientSession {
                 registry: connection.registry.clone(),

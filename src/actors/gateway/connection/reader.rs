@@ -16,15 +16,17 @@ use bytes::BytesMut;
 use tokio::time::Instant;
 
 use super::client::Connection;
+use super::deadlines::unless_closed;
 use super::transport::{ClientLost, ClientStream};
 use crate::actors::ConnectionId;
 use crate::actors::compute::long_frames::{LongFrame, LongFrames, Parsed};
 use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, READ_BYTES};
 use crate::actors::gateway::registry::{Handled, Request, Retire};
 use crate::actors::resources::long_work::SHORT_WORK;
-use crate::actors::resources::memory::Permit;
+use crate::actors::resources::memory::{Permit, time_to_read};
 use crate::actors::resources::turns::{Timer, end_turn};
 use crate::protocol::catalog::Service;
+use crate::protocol::limits::{MAX_FRAME, SHORT};
 use crate::protocol::op::{self, CallService, Compression, Incoming, Op, Problem, Subscribe};
 use crate::protocol::wire::frame::{Foreign, FrameError, FramePart, is_host_line};
 
@@ -73,6 +75,8 @@ pub(super) enum ReadStep {
     Performing(BoxFuture<()>),
     /// It waits for the memory permit of the incoming long frame.
     WaitingForRoom(BoxFuture<Result<Permit, ClientLost>>),
+    /// A computation whose frame keeps its permit waits for the earlier ones of its client. Its length, and the deadline.
+    AwaitingTurn(Option<Box<Request>>, usize, Instant),
     /// It reads a long frame, or joins pieces.
     Parsing(BoxFuture<(LongFrames, Parsed)>),
     /// The client has stopped sending, but may still read. The reader waits for the answers to its calls and
@@ -103,9 +107,18 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
                     Ok(ReadStep::Cutting)
                 }
                 ReadStep::WaitingForRoom(room) => ready!(room.as_mut().poll(cx)).map(|permit| {
-                    reader.long.permit = Some(permit);
+                    reader.long.hold(permit);
                     ReadStep::Reading
                 }),
+                ReadStep::AwaitingTurn(request, length, due) => {
+                    if !client.computations.is_empty() {
+                        ready!(reader.timer.poll(Some(*due), cx));
+                    }
+                    let request = request.take().map(|request| *request);
+                    Ok(request.map_or(ReadStep::Cutting, |request| {
+                        Self::queue(client, request, *length, *due)
+                    }))
+                }
                 ReadStep::Parsing(frame) => {
                     let (long, parsed) = ready!(frame.as_mut().poll(cx));
                     reader.long = long;
@@ -201,9 +214,9 @@ impl ClientReader {
         if self.frames >= FRAMES_IN_A_ROW {
             return end_turn(cx);
         }
+        self.long.give_back(client.transport()?.is_long_coming());
         ready!(self.poll_may_read(client, cx))?;
         let transport = client.transport()?;
-        self.long.give_back(transport.is_long_coming());
         let part = transport.cut()?;
         let is_long_coming = transport.is_long_coming();
         if part.is_some() || !transport.is_unfinished() {
@@ -276,7 +289,7 @@ impl ClientReader {
         mut incoming: Incoming,
         length: usize,
     ) -> ReadStep {
-        let mut is_computation = false;
+        let (mut is_computation, mut may_wait) = (false, false);
         match &incoming.op {
             Ok(Op::Subscribe(Subscribe { encoding, .. }))
                 if encoding.compression != Compression::None && !client.is_socket() =>
@@ -286,8 +299,15 @@ impl ClientReader {
             Ok(Op::CallService(CallService { service, .. })) => {
                 let service = Service::from_name(service);
                 is_computation = service.is_some_and(Service::is_computation);
+                may_wait = matches!(service, Some(Service::Rosapi(_)));
             }
             _ => {}
+        }
+        if let Some(permit) = &self.long.permit
+            && self.long.fragments.allocated() > SHORT
+        {
+            // The pieces need it after the op too.
+            permit.add(MAX_FRAME);
         }
         let request = Request {
             from: self.id,
@@ -295,11 +315,18 @@ impl ClientReader {
             permit: self.long.permit.clone(),
         };
         if is_computation {
-            client.computations.push(request, length);
-            client.start_computation();
-            return ReadStep::Cutting;
+            let due = Instant::now() + time_to_read(length);
+            return Self::queue(client, request, length, due);
         }
-        ReadStep::Performing(Box::pin(effect(client.registry.send(request))))
+        let effect = effect(client.registry.send(request));
+        if !may_wait {
+            return ReadStep::Performing(Box::pin(effect));
+        }
+        ReadStep::Performing(Box::pin(unless_closed(
+            effect,
+            client.gone.clone(),
+            client.ends,
+        )))
     }
 }
 

@@ -6,7 +6,6 @@
 use std::collections::HashSet;
 use std::net::IpAddr;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use actix::prelude::*;
 use tokio::time::Instant;
@@ -15,6 +14,7 @@ use super::{Client, Handled, Outlets, Registry, ToClient};
 use crate::actors::ConnectionId;
 use crate::actors::graph::registrations::{EntrySum, Registrations};
 use crate::actors::node::{Attach, Barrier, ClientLink, FinishAll, TakeCensus, guard};
+use crate::actors::resources::memory::{MAX_LONG_BACKLOG, Pool};
 use crate::actors::resources::places::Refused;
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::Verbosity;
@@ -55,6 +55,7 @@ impl Client {
             from,
             entries: EntrySum::default(),
             registered: Registrations::default(),
+            long_room: Pool::of(MAX_LONG_BACKLOG),
             withdrawn: HashSet::new(),
             verbosity: Verbosity::ALL,
             error_form: ErrorForm::default(),
@@ -78,7 +79,7 @@ impl Handler<Connect> for Registry {
         let link = ClientLink {
             registry: ctx.address().recipient(),
             connection: id,
-            gone: Arc::clone(&connect.outlets.gone),
+            gone: connect.outlets.gone.clone(),
         };
         let client = Client::new(connect.outlets, connect.from, link);
         self.clients.insert(id, client);
@@ -114,7 +115,7 @@ impl Handler<Disconnect> for Registry {
         self.withdraw(id);
         self.requests.forget_caller(id);
         if let Some(client) = self.clients.remove(&id) {
-            client.link.gone.store(true, Ordering::Relaxed);
+            client.link.gone.set();
             self.gauges.set_connections(self.clients.len() as u64);
         }
     }

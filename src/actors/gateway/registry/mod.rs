@@ -17,7 +17,7 @@ mod subscriptions;
 use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 use std::net::IpAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize};
+use std::sync::atomic::{AtomicU64, AtomicUsize};
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -34,7 +34,8 @@ use crate::actors::graph::topics::Topics;
 pub use crate::actors::node::{Attach, FinishAll, Nodes, RefuseCalls, SetTap, Tapped};
 use crate::actors::node::{ClientLink, Done, Tap};
 use crate::actors::resources::gauges::Gauges;
-use crate::actors::resources::memory::Permit;
+use crate::actors::resources::gone::Gone;
+use crate::actors::resources::memory::{Permit, Pool};
 use crate::actors::resources::places::Places;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::ErrorForm;
@@ -83,6 +84,8 @@ struct Client {
     /// The sum of its registrations, and of its calls and goals that wait for other clients.
     entries: EntrySum,
     registered: Registrations,
+    /// The memory of long calls and answers of other clients that wait for it.
+    long_room: Pool,
     /// Topics of the runtime's subscriptions that this client has explicitly unadvertised. Its messages there are
     /// dropped until it advertises again.
     withdrawn: HashSet<Topic>,
@@ -149,7 +152,10 @@ impl Handler<Request> for Registry {
                 Handled::at_once()
             }
         };
-        self.permit = None;
+        let permit = self.permit.take();
+        if let Some(permit) = permit.filter(|_| handled.0.is_none()) {
+            permit.trim();
+        }
         handled
     }
 }
@@ -211,7 +217,7 @@ pub struct Outlets {
     /// Bytes of short responses that were sent and are not written. The registry adds, and the connection subtracts.
     pub backlog: Arc<AtomicUsize>,
     /// Whether the client has left.
-    pub gone: Arc<AtomicBool>,
+    pub gone: Gone,
 }
 
 /// One frame of a client. From its connection, which waits for [`Handled`] before it continues to read.

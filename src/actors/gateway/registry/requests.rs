@@ -335,6 +335,9 @@ impl Registry {
         if server.is_some_and(Client::is_congested) {
             return Err(Refusal::ProviderBusy(name.to_owned()));
         }
+        if server.is_some_and(|server| !server.has_long_room(args.get().len())) {
+            return Err(Refusal::ProviderFull(name.to_owned()));
+        }
         let Some(caller) = self.clients.get(&origin.from) else {
             return Ok(());
         };
@@ -361,7 +364,7 @@ impl Registry {
             _entry: caller.entries.enter(bytes, None)?,
         });
         if let Some(server) = server {
-            server.send(self.covered(encode(&provider.spelling, &known_as)));
+            server.send_long(self.covered(encode(&provider.spelling, &known_as)));
         }
         Ok(())
     }
@@ -451,11 +454,17 @@ impl Registry {
         let Some(caller) = self.clients.get(&request.caller) else {
             return Ok(());
         };
+        let name = || request.name.to_string();
         if caller.is_congested() {
-            self.fail(&request, &Refusal::CallerBusy(request.name.to_string()));
+            self.fail(&request, &Refusal::CallerBusy(name()));
             return Ok(());
         }
-        caller.send(self.covered(encode(&request.name, request.id.as_ref())));
+        let answer = encode(&request.name, request.id.as_ref());
+        if !caller.has_long_room(answer.len()) {
+            self.fail(&request, &Refusal::CallerFull(name()));
+            return Ok(());
+        }
+        caller.send_long(self.covered(answer));
         Ok(())
     }
 
@@ -552,6 +561,17 @@ impl Client {
     /// Sends a status, a forwarded call or another client's response.
     fn send(&self, frame: Bytes) {
         self.respond(frame, None);
+    }
+
+    /// Sends a forwarded call or another client's response, which counts for `MAX_LONG_BACKLOG` if it is long.
+    fn send_long(&self, frame: Bytes) {
+        let room = self.long_room.try_take(frame.len());
+        self.send(cover(room.as_ref(), frame));
+    }
+
+    /// Whether a forwarded call or another client's response of this length may wait for it.
+    fn has_long_room(&self, bytes: usize) -> bool {
+        bytes <= SHORT || self.long_room.has(bytes)
     }
 
     /// Sends a response. `service` is the responding service, if it is the runtime's own.
