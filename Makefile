@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build install run page test conformance check-study test-page test-browser test-clients simulate fuzz attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
+.PHONY: help build install run page site test conformance check-study test-page test-browser test-clients simulate fuzz attack lint audit doc report mutants picture features wheel test-python test-learning ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -15,7 +15,9 @@ build: ## Build the release program; needs no network once the dependencies are 
 	@echo "make build: $(TARGET_DIR)/release/pendularm"
 	$(CARGO) build --release --locked
 
-install: build ## Install program and completions below PREFIX=/usr/local, in DESTDIR
+install: ## Install program and completions below PREFIX=/usr/local, in DESTDIR; without cargo the program that is already built
+	@if command -v "$(firstword $(CARGO))" > /dev/null; then $(MAKE) --no-print-directory build; \
+	elif [ ! -x "$(TARGET_DIR)/release/pendularm" ]; then echo "make install: needs cargo, or a program that is built already: $(TARGET_DIR)/release/pendularm" >&2; exit 1; fi
 	@echo "make install: $(DESTDIR)$(or $(PREFIX),/usr/local)"
 	@bash scripts/install.sh "$(TARGET_DIR)/release/pendularm" "$(DESTDIR)$(or $(PREFIX),/usr/local)"
 
@@ -48,7 +50,7 @@ test: ## Run every test that needs only Rust, except slow ones
 
 conformance: ## Test any server of the protocol against the specification's rules: ADDR=127.0.0.1:9095; ARGS="--category pid" or "--rule reset"
 	@echo "make conformance: one line per rule, about 40 s; exit status 0 if every rule holds"
-	@$(CARGO) run --quiet --locked -p pendularm-conformance -- "$(or $(ADDR),127.0.0.1:9095)" $(ARGS)
+	@$(CARGO) run --quiet --locked -- conformance "$(or $(ADDR),127.0.0.1:9095)" $(ARGS)
 
 check-study: ## Check the study on COUNT=10000 random arms, gains, poses and setpoints; FROM=n begins at case n; PROFILE=dev uses the tests' build
 	@echo "make check-study: an optimised build, then some minutes per 10000 cases"
@@ -57,9 +59,14 @@ check-study: ## Check the study on COUNT=10000 random arms, gains, poses and set
 test-page: node_modules page ## Check the page's types, test its logic without a browser, and compare its kernel with native runs; needs node 20 with npm
 	@echo "make test-page: types, unit tests, then the runs of the kernel"
 	node_modules/.bin/tsc
+	node_modules/.bin/tsc --project tsconfig.strict.json
 	node --test tests/page/
 	$(CARGO) run --locked --quiet --package pendularm-wasm --example runs > "$(TARGET_DIR)/runs.txt"
 	node tests/page/runs.mjs "$(TARGET_DIR)/runs.txt" pendularm.html
+
+site: ## Write the files of the public pages to OUT=site: the page, the lessons, the kept report, the library's documentation; needs python3 and a network the first time
+	@echo "make site: $(or $(OUT),site)"
+	@CARGO="$(CARGO)" bash scripts/site.sh "$(or $(OUT),site)"
 
 node_modules: package-lock.json
 	npm ci --silent --no-audit --no-fund
@@ -122,6 +129,9 @@ wheel: $(if $(PORTABLE),,build) ## Build the Python wheel with the program into 
 
 test-python: wheel ## Install the wheel into a fresh virtual environment and test it there; ARGS="-k batch" selects tests
 	@bash scripts/test-python.sh $(ARGS)
+
+test-learning: wheel ## Test the adapters to stable-baselines3 and Ray; installs both, and torch, which needs some 6 GB
+	@bash scripts/test-python.sh --learning $(ARGS)
 
 ros2: ## Connect a running arm to a ROS 2 graph on Zenoh; ARGS="--connect 127.0.0.1:9095 --domain 0 --namespace /left"; PROFILE=dev uses the tests' build
 	@echo "make ros2: a build of some minutes the first time; then in the foreground until SIGINT"

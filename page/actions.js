@@ -4,7 +4,7 @@
 
 import { announce, byId, passFocus, warn } from "./dom.js";
 import { inPageNames } from "./format.js";
-import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, setState } from "./runtime.js";
+import { enable, pause, reset, sendSetpoint, setFriction, setGains, setIntegrator, setMotors, setParams, setPeriod, setState } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
 import { state, tell, watch } from "./store.js";
 
@@ -33,7 +33,7 @@ export function startActions() {
     undo.past.length = 0;
     showUndo();
   });
-  watch(["connection", "integrator", "params", "gains", "period", "enabled", "setpoint"], showUndo);
+  watch(["connection", "integrator", "params", "gains", "period", "friction", "motors", "enabled", "setpoint"], showUndo);
 }
 
 /** Announces the refusals, or that there are none. @param {string} refused @param {string} done */
@@ -51,7 +51,8 @@ export async function takeBack() {
 }
 
 /** Applies the given settings, and returns the text of all refusals. The controller is last, so it never acts with half of the settings. */
-export async function apply(/** @type {import("./settings.js").Settings} */ { integrator, params, gains, period, controller, setpoint, start }) {
+export async function apply(/** @type {import("./settings.js").Settings} */ settings) {
+  const { integrator, params, gains, period, friction, motors, controller, setpoint, start } = settings;
   applying = true;
   tell("anew");
   const answers = [];
@@ -60,6 +61,8 @@ export async function apply(/** @type {import("./settings.js").Settings} */ { in
   if (gains) answers.push(await setGains(gains));
   if (integrator) answers.push(await setIntegrator(integrator));
   if (period) answers.push(await setPeriod(period));
+  if (friction && state.friction) answers.push(await setFriction(friction));
+  if (motors && state.motors) answers.push(await setMotors(motors));
   if (setpoint) answers.push(setSetpoint(setpoint));
   if (start) answers.push(await setState(start.position ?? new Array(state.links).fill(0), start.velocity));
   if (controller != null && controller !== false) answers.push(await enable(controller));
@@ -70,7 +73,8 @@ export async function apply(/** @type {import("./settings.js").Settings} */ { in
 /** Sends the setpoint if the runtime will accept it. A message has no answer, so the refusal has the words of the services. @param {number[]} setpoint */
 function setSetpoint(setpoint) {
   const wrong = setpoint.findIndex((angle) => !Number.isFinite(angle));
-  const status = setpoint.length !== state.links ? `setpoint must have ${state.links} entries, got ${setpoint.length}` : wrong >= 0 ? `setpoint[${wrong}] must be a number` : "";
+  const status = setpoint.length !== state.links ? `setpoint must have ${state.links} entries, got ${setpoint.length}` : wrong >= 0
+    ? `setpoint[${wrong}] must be a number` : "";
   if (!status) sendSetpoint(setpoint);
   return { result: !status, status };
 }
@@ -80,13 +84,16 @@ function textOf(answers) {
   return inPageNames(answers.filter((answer) => !answer.result).map((answer) => answer.status ?? "").join("; "));
 }
 
-/** Sets all settings, from the starting pose, then running or paused. Returns the text of all refusals. @param {import("./settings.js").Settings} settings @param {boolean} paused */
+/**
+ * Sets all settings, from the starting pose, then running or paused. Returns the text of all refusals. @param
+ * {import("./settings.js").Settings} settings @param {boolean} paused
+ */
 export async function setScene({ controller, setpoint, ...rest }, paused) {
   await enable(false);
   const early = await apply({ ...rest, controller: null, setpoint: null });
   const answer = await reset();
   // A reset changes the setpoint to the starting pose, so the setpoint is sent after it.
-  const late = await apply({ integrator: null, params: null, gains: null, period: null, controller, setpoint });
+  const late = await apply({ integrator: null, params: null, gains: null, period: null, friction: null, motors: null, controller, setpoint });
   if (state.paused !== paused) await pause(paused);
   return [early, late, textOf([answer])].filter(Boolean).join("; ");
 }

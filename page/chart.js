@@ -5,7 +5,7 @@
 import { significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
 import { Pencil } from "./pencil.js";
-import { LogScale, powerOfTen } from "./scale.js";
+import { Axis, LogScale, powerOfTen, times } from "./scale.js";
 import { colors } from "./theme.js";
 
 /** @typedef {import("./scale.js").Scale} Scale */
@@ -239,8 +239,10 @@ ERRORS.marks = ERRORS.powers(6, (value) => (value === 1 ? "1" : powerOfTen(value
 export function drawBars(surface, bars, name = "measurement of the controller") {
   const largest = Math.max(...bars.map(Math.abs));
   if (!(largest > 0)) return;
-  const up = { place: (/** @type {number} */ value) => 0.5 + (0.46 * value) / largest, marks: /** @type {[number, string][]} */ ([1, 0, -1].map((part) => [part * largest, significant(part * largest, 2)])) };
-  const across = { place: (/** @type {number} */ k) => (k + 0.5) / bars.length, marks: /** @type {[number, string][]} */ (bars.flatMap((_, k) => (k % 2 === 0 ? [[k, String(k + 1)]] : []))) };
+  const up = { place: (/** @type {number} */ value) => 0.5 + (0.46 * value) / largest,
+    marks: /** @type {[number, string][]} */ ([1, 0, -1].map((part) => [part * largest, significant(part * largest, 2)])) };
+  const across = { place: (/** @type {number} */ k) => (k + 0.5) / bars.length,
+    marks: /** @type {[number, string][]} */ (bars.flatMap((_, k) => (k % 2 === 0 ? [[k, String(k + 1)]] : []))) };
   const chart = new Chart(surface, across, up, ROOMY);
   chart.frame({ across: name, up: "speed [rad/s]", grid: "rows" });
   const wide = (0.7 * (chart.right - chart.left)) / bars.length;
@@ -251,7 +253,10 @@ export function drawBars(surface, bars, name = "measurement of the controller") 
   });
 }
 
-/** The errors of the method and of the hold, as two bars on one fixed scale. @param {Surface} surface @param {{error: number | null, sampling: number | null} | null} errors */
+/**
+ * The errors of the method and of the hold, as two bars on one fixed scale. @param {Surface} surface @param {{error: number |
+ * null, sampling: number | null} | null} errors
+ */
 export function drawErrors(surface, errors) {
   if (!errors) return;
   const chart = new Chart(surface, ERRORS, NONE, ROOMY);
@@ -262,7 +267,8 @@ export function drawErrors(surface, errors) {
     const y = chart.top + k * room;
     chart.words(`Error of ${name}: ${value === null ? "not known" : `${significant(value, 2)} rad`}`, chart.left + 6, y + 14, "left");
     chart.context.fillStyle = color;
-    if (value !== null && value > 0) chart.context.fillRect(chart.left, y + 28, Math.max(2, chart.x(ERRORS.within(value)) - chart.left), Math.min(THICK, Math.max(10, room - 48)));
+    if (value !== null && value > 0) chart.context.fillRect(chart.left, y
+      + 28, Math.max(2, chart.x(ERRORS.within(value)) - chart.left), Math.min(THICK, Math.max(10, room - 48)));
   });
 }
 
@@ -275,6 +281,27 @@ export function drawPicture({ context, width, height }, { start, settings }) {
   joints(start.length, start, lengths, x, y);
   const [px, py] = [(/** @type {number} */ metres) => width / 2 + scale * metres, (/** @type {number} */ metres) => height / 2 - scale * metres];
   context.lineCap = "round";
-  masses.forEach((mass, i) => line(context, px(x[i]), py(y[i]), px(x[i + 1]), py(y[i + 1]), colors.joints[i], Math.min(9, Math.max(1.5, 4 + 0.8 * Math.log10(Math.max(1e-9, mass))))));
+  masses.forEach((mass, i) => line(context, px(x[i]), py(y[i]), px(x[i + 1]), py(y[i + 1]), colors.joints[i],
+    Math.min(9, Math.max(1.5, 4 + 0.8 * Math.log10(Math.max(1e-9, mass))))));
   circle(context, width / 2, height / 2, 3, colors.muted);
+}
+
+const RESPONSE = new Axis(4, 0.5, 20);
+
+/**
+ * Responses over each other, each with its name, and the present one.
+ * @param {Surface} surface @param {{name: string, points: number[][]}[]} responses @param {number[][]} points @param {number} setpoint
+ * @param {number} lasts [s]
+ */
+export function drawResponses(surface, responses, points, setpoint, lasts) {
+  const all = [...responses.map((one) => one.points), points].flat().map(([, q]) => q);
+  RESPONSE.fit(Math.min(setpoint, ...all), Math.max(setpoint + 0.1, ...all));
+  const chart = new Chart(surface, times(0, lasts), RESPONSE, ROOMY);
+  chart.frame({ across: "time since the start [s]", up: "joint 1 [rad]" });
+  chart.inside(() => {
+    chart.path([[0, setpoint], [lasts, setpoint]], colors.muted, { width: 1, dash: DASHED });
+    responses.forEach(({ points: old }, k) => chart.path(old, colors.methods[k], { width: 1.5 }));
+    chart.path(points, colors.ink, { width: 2.5 });
+  });
+  responses.forEach(({ name }, k) => chart.words(name, chart.right - 6, chart.bottom - 12 - 17 * (responses.length - 1 - k), "right", colors.methods[k]));
 }

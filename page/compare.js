@@ -9,6 +9,7 @@ import { announce, byId, fillTable, setText } from "./dom.js";
 import { busy, option, panel, withoutFigure } from "./field.js";
 import { duration, fixed, METHODS, significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
+import { fromRest, questionOf, withFixedPeriod } from "./question.js";
 import { describeRun, distances, endOf } from "./ladder.js";
 import { rollout } from "./runtime.js";
 import { Axis, LogScale, powerOfTen, times } from "./scale.js";
@@ -24,7 +25,8 @@ const SECONDS = 5; // default duration
 /** Smaller errors are rounding [rad]. */
 const SMALLEST = 1e-13;
 const ROOM = { left: 50 };
-const COLUMNS = /** @type {const} */ ([["outcome", "outcome"], ["energy", "energy gained"], ["error", "largest error"], ["evaluations", "evaluations"], ["time", "run time"]]);
+const COLUMNS = /** @type {const} */ ([["outcome", "outcome"], ["energy", "energy gained"], ["error", "largest error"], ["evaluations", "evaluations"],
+  ["time", "run time"]]);
 
 const x = new Float64Array(MOST_LINKS + 1);
 const y = new Float64Array(MOST_LINKS + 1);
@@ -35,7 +37,10 @@ const from = option({ label: "start", choices: [["now", "as it is"], ["rest", "s
 const controller = option({ label: "controller", choices: [["off", "off"], ["on", "on"]] });
 let said;
 let surfaces = /** @type {Surface[]} */ ([]);
-/** The shown runs, with the reference last. @type {{color: string, away: (number | null)[] | null, times: number[], energy: number[], poses: (number[] | null)[], trail: (number[] | null)[], last: number}[]} */
+/**
+ * The shown runs, with the reference last. @type {{color: string, away: (number | null)[] | null, times: number[], energy:
+ * number[], poses: (number[] | null)[], trail: (number[] | null)[], last: number}[]}
+ */
 let runs = [];
 let instants = /** @type {number[]} */ ([]); // of the reference's samples [s]
 let lengths = /** @type {number[]} */ ([]);
@@ -44,7 +49,8 @@ let playing = false;
 let began = 0; // the clock at the first sample [ms]
 
 export function startCompare() {
-  said = panel(byId("compare-form"), [timestep, seconds, from, controller], [["Compare", () => busy(said.buttons[0], "Computing…", compare), { type: "submit", class: "primary" }]]);
+  said = panel(byId("compare-form"), [timestep, seconds, from, controller],
+    [["Compare", () => busy(said.buttons[0], "Computing…", compare), { type: "submit", class: "primary" }]]);
   const pictures = /** @type {[string, (surface: Surface) => void][]} */ ([
     ["arm", drawArms],
     ["chart", (surface) => drawLines(surface, () => instants, ({ away }) => away ?? [], errorScale())],
@@ -64,13 +70,12 @@ export function startCompare() {
 }
 
 async function compare() {
-  if (state.links === 0 || !state.params) {
+  const present = questionOf({ ...state, enabled: controller.input.value === "on" });
+  if (!present || state.connection !== "open") {
     said.show("There is no arm to compare: not connected.");
     return;
   }
   const n = state.links;
-  const zero = new Array(n).fill(0);
-  const still = from.input.value === "rest";
   const step = (timestep.number() ?? 1e3 * state.integrator.timestep) / 1e3;
   const asked = seconds.number() ?? SECONDS;
   // A whole number of steps between samples, so all runs are sampled at the same times. The runtime refuses wrong times.
@@ -78,20 +83,18 @@ async function compare() {
   const every = Math.ceil(steps / MOST_SAMPLES);
   const intervals = Math.round(steps / every) || 1;
   const lasts = intervals * every * step || asked;
-  const common = {
-    q0: still ? zero : Array.from(state.position.subarray(0, n)), qdot0: still ? zero : Array.from(state.velocity.subarray(0, n)),
-    duration: lasts, params: state.params, samples: intervals + 1,
-    ...(controller.input.value === "on" ? { gains: state.gains, setpoint: Array.from(state.setpoint.subarray(0, n)) } : {}),
-  };
+  // All runs have one controller, which acts at the same times, also in the reference.
+  const common = withFixedPeriod({ ...(from.input.value === "rest" ? fromRest(present) : present), timestep: step });
+  const run = { duration: lasts, samples: intervals + 1 };
   const wanted = [...METHODS.map(([method]) => ({ integrator: method, timestep: step })), { integrator: "rk4", timestep: step * REFERENCE_PART }];
-  const answers = await Promise.all(wanted.map((one) => rollout({ ...common, ...one })));
+  const answers = await Promise.all(wanted.map((one) => rollout({ ...common, ...one }, run)));
   const refused = answers.find((answer) => !answer.result);
   said.show(withoutFigure(refused?.status ?? ""));
   if (refused) return;
   const found = answers.map(({ values }, i) => ({ ...values, method: wanted[i].integrator, timestep: wanted[i].timestep }));
   const reference = found.pop();
   const away = found.map((run) => distances(run, reference));
-  lengths = state.params.lengths;
+  lengths = present.params.lengths;
   instants = reference.times;
   runs = [...found, reference].map((run, i) => ({ ...tracked(run, n), away: away[i] ?? null, color: i < found.length ? `method${i + 1}` : "muted" }));
   byId("compare-result").hidden = false;
@@ -114,9 +117,11 @@ function tracked({ times: own, positions, energy }, n) {
 
 function showTable(found, away, reference, lasted) {
   const lines = found.map((run, i) => describeRun(run, away[i], lasted));
-  fillTable(byId("compare-table"), ["method", ...COLUMNS.map(([, name]) => name)], lines.map((line, i) => [[line.name, `method${i + 1}`], ...COLUMNS.map(([key]) => line[key])]));
+  fillTable(byId("compare-table"), ["method", ...COLUMNS.map(([, name]) => name)],
+    lines.map((line, i) => [[line.name, `method${i + 1}`], ...COLUMNS.map(([key]) => line[key])]));
   const ended = endOf(reference.times, lasted, reference.timestep);
-  const text = `At ${duration(found[0].timestep)}, against Runge–Kutta 4 at ${duration(reference.timestep)}, for ${duration(lasted)}.${ended === null ? "" : ` The reference diverged after t = ${fixed(ended, 2)} s, so no error is known.`}`;
+  const text = `At ${duration(found[0].timestep)}, against Runge–Kutta 4 at ${duration(reference.timestep)}, for `
+    + `${duration(lasted)}.${ended === null ? "" : ` The reference diverged after t = ${fixed(ended, 2)} s, so no error is known.`}`;
   setText(byId("compare-text"), text);
   announce(text);
 }

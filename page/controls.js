@@ -6,7 +6,8 @@ import { busy, numberField, refusal } from "./field.js";
 import { METHODS, seconds, shortName } from "./format.js";
 import { limitLabel } from "./stability_panel.js";
 import { controlPeriodLimit, limitInForce, periodText } from "./policy.js";
-import { enable, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, suggestGains } from "./runtime.js";
+import { questionOf } from "./question.js";
+import { enable, sendSetpoint, setFriction, setGains, setIntegrator, setMotors, setParams, setPeriod, suggestGains } from "./runtime.js";
 import { LOOP, set, state, watch } from "./store.js";
 
 const PLACES = [["Earth", 9.81], ["Moon", 1.62], ["Mars", 3.72], ["Jupiter", 24.79], ["none", 0]];
@@ -31,7 +32,7 @@ export function startControls() {
   suggestSaid = refusal(suggestButton);
   byId("suggest").append(suggestButton, suggestSaid.element);
   watch("links", makeJointFields);
-  watch(["params", "gains", "setpoint"], showStored);
+  watch(["params", "gains", "friction", "motors", "setpoint"], showStored);
   watch("joint", (joint) => { for (const [i, radio] of radios("joint").entries()) radio.checked = i === joint; });
 }
 
@@ -67,7 +68,8 @@ function startClocks() {
 function startGravity() {
   const gravity = numberField({ label: "gravity", unit: "m/s²", low: 0, high: 30, commit: (value) => setParams({ gravity: value }) });
   byId("gravity-field").append(gravity.element);
-  byId("gravity-places").append(...PLACES.map(([name, value]) => el("button", { type: "button", class: "small", onclick: () => gravity.report(setParams({ gravity: value })) }, name)));
+  byId("gravity-places").append(...PLACES.map(([name, value]) => el("button",
+    { type: "button", class: "small", onclick: () => gravity.report(setParams({ gravity: value })) }, name)));
   watch("params", (params) => gravity.accept(params.gravity));
 }
 
@@ -91,7 +93,9 @@ export function switchController(on) {
 /** Requests gains for the present arm and sets them. The change can be undone. */
 export function takeSuggestion() {
   return busy(suggestButton, "Searching…", async () => {
-    const { result, values } = await suggestSaid.report(suggestGains());
+    const question = questionOf({ ...state, setpointKnown: true }); // gains do not depend on it
+    if (!question) return;
+    const { result, values } = await suggestSaid.report(suggestGains(question));
     const { kp, ki, kd } = values.gains ?? values;
     if (result) suggestSaid.report(setGains({ kp, ki, kd }));
   });
@@ -129,14 +133,26 @@ export function chooseJoint(joint) {
 function makeJointFields(links) {
   perJoint = [];
   const of = (group, key, send) => ({ stored: () => state[group]?.[key], send: (values) => send({ [key]: values }) });
-  const gain = (key, unit, high, name) => fill(`${key}-fields`, links, { unit, low: high / 1e4, high, log: true, zero: true, name, ...of("gains", key, setGains) });
+  const gain = (key, unit, high, name) => fill(`${key}-fields`, links,
+    { unit, low: high / 1e4, high, log: true, zero: true, name, ...of("gains", key, setGains) });
   fill("masses-fields", links, { unit: "kg", low: 0.05, high: 20, log: true, name: "mass", ...of("params", "masses", setParams) });
   fill("lengths-fields", links, { unit: "m", low: 0.1, high: 3, log: true, name: "length", ...of("params", "lengths", setParams) });
   gain("kp", "N m/rad", 20000, "proportional gain");
   gain("ki", "N m/(rad s)", 50000, "integral gain");
   gain("kd", "N m s/rad", 1000, "derivative gain");
-  fill("setpoint-fields", links, { unit: "rad", low: -Math.PI, high: Math.PI, name: "setpoint", stored: () => (state.setpointKnown ? Array.from(state.setpoint.subarray(0, links)) : undefined), values: presentSetpoint, send: async (positions) => place(positions) });
-  byId("joint-choice").replaceChildren(...Array.from({ length: links }, (_, joint) => el("label", { class: `segment joint${joint + 1}`, title: `Joint ${joint + 1} (key j for the next)` },
+  fill("friction-fields", links, {
+    unit: "N m s/rad", low: 0.01, high: 100, log: true, zero: true, name: "friction", stored: () => state.friction?.viscous,
+    send: (viscous) => setFriction({ viscous }),
+  });
+  fill("limit-fields", links, {
+    unit: "N m", low: 1, high: 1000, log: true, name: "effort limit", stored: () => state.motors?.effort ?? undefined, send: (effort) => setMotors({ effort }),
+  });
+  fill("setpoint-fields", links, { unit: "rad", low: -Math.PI, high: Math.PI, name: "setpoint",
+    stored: () => (state.setpointKnown ? Array.from(state.setpoint.subarray(0, links)) : undefined), values: presentSetpoint,
+    send: async (positions) => place(positions),
+  });
+  byId("joint-choice").replaceChildren(...Array.from({ length: links },
+    (_, joint) => el("label", { class: `segment joint${joint + 1}`, title: `Joint ${joint + 1} (key j for the next)` },
     el("input", { type: "radio", name: "joint", onchange: () => chooseJoint(joint) }), el("span", {}, `${joint + 1}`))));
   set("joint", state.joint < links ? state.joint : 0);
   showStored();

@@ -1,4 +1,4 @@
-// The course: ten steps, each a scene, a chart, a task that ticks itself, and a question with its answer.
+// The course: eleven steps, each a scene, a chart, a task that ticks itself, and a question with its answer.
 // Invariant: a step is data. Its text has at most 40 words. Its view sets the scene on a click only.
 
 import { DEFAULTS } from "./settings.js";
@@ -14,8 +14,8 @@ import { DEFAULTS } from "./settings.js";
  * @property {(links: number) => Settings} scene
  * @property {number[]} [offset] pose at the start [rad], else stretched out
  * @property {boolean} [paused] whether the arm takes two control steps a second
- * @property {"velocity" | "bars" | "errors" | "map" | "energy" | "ladder" | "pictures" | "form"} chart
- * @property {"period" | "timestep" | "damping" | null} dial
+ * @property {"velocity" | "bars" | "errors" | "map" | "responses" | "energy" | "ladder" | "pictures" | "form"} chart
+ * @property {"period" | "timestep" | "damping" | "gains" | null} dial
  * @property {boolean} [methods] whether the methods can be chosen
  * @property {Question} [guess] before the dial is shown
  * @property {{text: string, done: (seen: Seen) => boolean}} task
@@ -28,13 +28,24 @@ export const BEYOND = { 2: 0.0055, 3: 0.0038 };
 const WITHIN = { 2: 0.004, 3: 0.002 };
 /** Short enough that the simulation's error is not visible [s]. */
 const FINE = 0.0001;
+/** Gains that are soft enough for a visible response, with some integral. @type {Record<number, import("./settings.js").Gains>} */
+export const SOFT = {
+  2: { kp: [200, 100], ki: [60, 30], kd: [60, 20] },
+  3: { kp: [400, 100, 40], ki: [120, 30, 12], kd: [120, 30, 6] },
+};
+/** Effort limits of that step: little more than the weight needs [N m]. @type {Record<number, number[]>} */
+export const WEAK = { 2: [30, 10], 3: [60, 25, 8] };
 /** Four methods. */
 const ALL = 4;
 /** The required reduction of the method's error. */
 const MUCH = 100;
 const SOME_SCENES = 3;
-/** Energy counts as kept if its total varies by at most this [J] for this time [s]. Euler exceeds it within a second. */
-const [KEPT, LONG] = [0.5, 3];
+/** Energy counts as kept if it never differs by more from that of the start [J], for this time [s] and at this timestep [s]. */
+export const KEPT = 0.1;
+const LONG = 10;
+const STRIDE = 0.005;
+/** The first joint state after a reset comes within this time [s]. */
+const FIRST = 0.1;
 
 /** @param {number} links @param {number} period @param {Partial<Settings>} [changed] @returns {Settings} */
 function controlled(links, period, changed = {}) {
@@ -45,12 +56,14 @@ function controlled(links, period, changed = {}) {
 export const STEPS = [
   {
     id: "hold", title: "A controller holds the arm",
-    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, which is called the end effector. The controller moves it to the new place.",
+    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, which is called the end "
+      + "effector. The controller moves it there. Arcs show the torques.",
     scene: (links) => controlled(links, 0.001),
     chart: "velocity", dial: null,
     task: { text: "Drag the end effector to a new place, and wait until it arrives.", done: ({ reached }) => reached },
     question: {
-      text: "What does the controller do between two measurements?", answers: ["It holds the torques as they are", "It corrects them all the time", "It sets them to zero"], right: 0,
+      text: "What does the controller do between two measurements?",
+        answers: ["It holds the torques as they are", "It corrects them all the time", "It sets them to zero"], right: 0,
       because: "A computer measures only at certain times. Between two measurements it holds each torque. This is called a hold.",
     },
   },
@@ -60,7 +73,7 @@ export const STEPS = [
     scene: (links) => controlled(links, 0.001),
     chart: "velocity", dial: "period",
     guess: {
-      text: "At which period does it begin to shake?", answers: ["about 1 ms", "about 4 ms", "about 50 ms"], right: 1,
+      text: "At which period does it begin to shake?", answers: ["below 1 ms", "at 3 to 5 ms", "about 50 ms"], right: 1,
       because: "The red mark shows the limit. It is 4.3 ms for two links and 3 ms for three.",
     },
     task: { text: "Make the period longer until the arm shakes.", done: ({ shook }) => shook },
@@ -70,31 +83,54 @@ export const STEPS = [
     },
   },
   {
+    id: "pid", title: "Three gains, and windup",
+    text: "The torque is kp times the error, plus ki times its sum over time, plus kd times the error of the speed. The arm hangs and must come "
+      + "up. Each change starts the move again.",
+    scene: (links) => controlled(links, 0.001, { integrator: { method: "rk4", timestep: 0.001 }, gains: SOFT[links] }),
+    offset: [-Math.PI / 2, 0, 0],
+    chart: "responses", dial: "gains",
+    task: {
+      text: "Show a sag without ki, an overshoot by too much ki, windup at 30 N m, and its cure.",
+      done: ({ responses: { sag, overshoot, windup, cure } }) => sag && overshoot && windup && cure,
+    },
+    question: {
+      text: "Why does the arm overshoot with the limit?",
+      answers: ["The integral grew while the motor could not give more", "The motor is too strong", "The timestep is too long"], right: 0,
+      because: "At its limit the motor cannot follow. The error stays, and the sum of it grows: windup. It falls only beyond the setpoint. A "
+        + "cure stops the sum meanwhile.",
+    },
+  },
+  {
     id: "look", title: "Look closely",
-    text: "Each bar is the speed of the last joint at one measurement, computed without gravity after a tiny push. The arm itself starts beside the pose that the controller holds. It moves in slow motion: two measurements a second.",
+    text: "Each bar is the speed of the last joint at one measurement, computed without gravity after a tiny push. The arm itself starts beside "
+      + "the pose that the controller holds. It moves in slow motion: two measurements a second.",
     scene: (links) => controlled(links, BEYOND[links]),
     offset: [0, 0.02, 0], paused: true,
     chart: "bars", dial: "period",
     task: { text: "Shorten the period until the bars shrink.", done: ({ shrinks, stable }) => shrinks && stable },
     question: {
-      text: "At the first period the last bars pointed up and down in turn. Why?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
+      text: "At the first period the last bars pointed up and down in turn. Why?",
+        answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
       because: "The torque is held too long. It pushes the joint past the target. At the first period the pushes grew.",
     },
   },
   {
     id: "method", title: "A better method?",
-    text: "The method computes the motion between two measurements. Runge–Kutta 4 is far more exact than Euler. Try all four: does the limit of the period move?",
+    text: "The method computes the motion between two measurements. Runge–Kutta 4 is far more exact than Euler. Try all four: does the limit of "
+      + "the period move?",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "velocity", dial: "period", methods: true,
     task: { text: "Try all four methods at this period.", done: ({ methods }) => methods.size === ALL },
     question: {
-      text: "Why does a better method not help?", answers: ["The controller still measures as rarely", "Euler is exact enough", "The controller is too weak"], right: 0,
+      text: "Why does a better method not help?",
+      answers: ["The controller still measures as rarely", "Euler is exact enough", "The controller is too weak"], right: 0,
       because: "This limit comes from the hold between two measurements. A real robot has no method, but such a limit too.",
     },
   },
   {
     id: "timestep", title: "A finer timestep?",
-    text: "The simulation has its own clock, the timestep. A shorter one makes the computed motion more exact. The method and the control period stay the same. They are named above the chart.",
+    text: "The simulation has its own clock, the timestep. A shorter one makes the computed motion more exact. The method and the control period "
+      + "stay the same. They are named above the chart.",
     scene: (links) => controlled(links, WITHIN[links], { integrator: { method: "midpoint", timestep: WITHIN[links] } }),
     chart: "errors", dial: "timestep",
     task: { text: "Make the error of the method 100 times smaller.", done: ({ gain }) => gain >= MUCH },
@@ -105,7 +141,8 @@ export const STEPS = [
   },
   {
     id: "limit", title: "What sets the limit",
-    text: "Here more damping or less mass makes the arm react faster: the controller must measure more often. The limit is about T = 2 λmin(Kd⁻¹ M). M is the mass matrix, Kd the damping, λmin the smallest eigenvalue.",
+    text: "More damping or less mass means that a held torque changes the speed faster. The controller must measure more often. The limit is "
+      + "about T = 2 λmin(Kd⁻¹ M), with mass matrix M, damping Kd, smallest eigenvalue λmin.",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "map", dial: "damping",
     task: { text: "Change damping and mass until this period is stable.", done: ({ stable }) => stable },
@@ -116,18 +153,25 @@ export const STEPS = [
   },
   {
     id: "energy", title: "Without a controller",
-    text: "Nothing drives this swing, so its energy should stay constant. Euler at 5 ms makes it grow. Choose methods and watch the total.",
+    text: "Nothing drives this swing, so its energy should stay constant. Euler at 5 ms makes it grow. Each choice starts a new swing. Some "
+      + "methods gain energy, others lose it, also where no motion looks wrong.",
     scene: (links) => ({ ...structuredClone(DEFAULTS[links]), integrator: { method: "euler", timestep: 0.005 }, controller: false }),
     chart: "energy", dial: "timestep", methods: true,
-    task: { text: "Find a method that keeps the energy at 5 ms for 3 s.", done: ({ energy }) => energy.high - energy.low <= KEPT && energy.until - energy.since >= LONG },
+    task: {
+      text: `At 5 ms, find a method that keeps the energy within ${KEPT} J for ${LONG} s.`,
+      done: ({ energy }) => energy.timestep === STRIDE && energy.since < FIRST && energy.until >= LONG && energy.low >= -KEPT && energy.high <= KEPT,
+    },
     question: {
-      text: "Can Euler keep the energy with a shorter step?", answers: ["Yes, below 1 ms", "No, the energy only grows more slowly", "Yes, below 0.1 ms"], right: 1,
-      because: "Without damping, Euler makes even a small swing wider, however short the step is.",
+      text: "Can Euler keep the energy with a shorter step?",
+        answers: ["Yes, below 1 ms", "No, the energy only grows more slowly", "Yes, below 0.1 ms"], right: 1,
+      because: "Without damping, Euler makes even a small swing wider, however short the step is. The other methods change it too, but far less: "
+        + "this Verlet guesses a velocity, so it is not symplectic.",
     },
   },
   {
     id: "price", title: "The price of accuracy",
-    text: "Each dot is one run, with its error and its run time. Solid lines show the error of the method. Dashed lines show the distance from a controller without a hold. A cross marks a run that diverged.",
+    text: "Each dot is one run, with its error and its run time. Solid lines show the error of the method. Dashed lines show the distance from a "
+      + "controller without a hold. A cross marks a run that diverged.",
     scene: (links) => controlled(links, WITHIN[links]),
     chart: "ladder", dial: null,
     task: { text: "Measure the four methods.", done: ({ measured }) => measured },
@@ -138,7 +182,8 @@ export const STEPS = [
   },
   {
     id: "extreme", title: "Stiff and extreme",
-    text: "Thirty-nine arms that are hard to simulate: light links, high gains, extreme numbers. Click a picture to start its scene. Some scenes need another number of links. The sentence under a picture describes the correct motion.",
+    text: "Twelve arms that are hard to simulate: light links, high gains, extreme numbers. Click a picture. Its correct motion is played "
+      + "slowly, and beside it a motion with a method or a timestep that fails. The live arm starts too.",
     scene: (links) => structuredClone(DEFAULTS[links]),
     chart: "pictures", dial: null,
     task: { text: "Start three of them.", done: ({ scenes }) => scenes.size >= SOME_SCENES },
@@ -149,7 +194,8 @@ export const STEPS = [
   },
   {
     id: "own", title: "Your own arm",
-    text: "Fill in your arm and the gains of its controller. The sheet shows the largest period and timestep that they allow, the reason, and the benefit of a better method.",
+    text: "Fill in your arm and the gains of its controller. The sheet shows the largest period and timestep that they allow, the reason, and "
+      + "the benefit of a better method.",
     scene: (links) => controlled(links, 0.001),
     chart: "form", dial: null,
     task: { text: "Make the sheet of your arm.", done: ({ sheet }) => sheet },
@@ -171,19 +217,26 @@ export function nothingSeen() {
     stable: false, // whether the active loop is stable
     measured: false, // whether the ladder is complete
     scenes: /** @type {Set<string>} */ (new Set()), // started scenes
-    energy: { of: "", since: 0, until: 0, low: 0, high: 0 }, // of the free swing; see `followEnergy`
+    energy: { of: "", timestep: 0, since: Infinity, until: 0, low: 0, high: 0 }, // of the free swing; see `followEnergy`
+    responses: { sag: false, overshoot: false, windup: false, cure: false }, // what they have shown
     sheet: false, // whether a sheet was made
   };
 }
 
 /**
- * The range of the total energy [J] since a time [s]. The range begins again with other settings `of` the arm, after a reset, and
- * when it is too wide.
- * @param {Seen["energy"]} range @param {string} of @param {number} time @param {number} total
+ * The range of the energy [J] since a time [s]. The energy is 0 in the starting pose at rest. The range begins again with other settings
+ * `of` the arm, and after a reset.
+ * @param {Seen["energy"]} range @param {string} of @param {number} timestep @param {number} time @param {number} total
  */
-export function followEnergy({ of: before, since, until, low, high }, of, time, total) {
-  const wider = { of, since, until: time, low: Math.min(low, total), high: Math.max(high, total) };
-  return of === before && time >= until && wider.high - wider.low <= KEPT ? wider : { of, since: time, until: time, low: total, high: total };
+export function followEnergy({ of: before, since, until, low, high }, of, timestep, time, total) {
+  return of === before && time >= until
+    ? { of, timestep, since, until: time, low: Math.min(low, total), high: Math.max(high, total) }
+    : { of, timestep, since: time, until: time, low: total, high: total };
+}
+
+/** The ids of steps in a text, such as the ticks that the browser keeps or a link carries. @param {string | null} text @returns {string[]} */
+export function stepsIn(text) {
+  return (text ?? "").split(",").filter((id) => STEPS.some((one) => one.id === id));
 }
 
 /** Whether a deviation decays: its last bars compared with its first ones. @param {number[]} bars */
@@ -201,11 +254,11 @@ export function ofLimit(time, limit) {
   return limit === 0 ? `${short(time)} ms, none known as stable` : `${short(time)} of ${short(limit)} ms`;
 }
 
+/** The steps by the numbers of older links. */
+const NUMBERED = ["hold", "slow", "look", "method", "timestep", "limit", "energy", "price", "extreme", "own"];
+
 /** The step that a link names, from 0; -1 if it names none. @param {string} hash */
 export function stepIn(hash) {
   const named = new URLSearchParams(hash.replace(/^#/, "")).get("step") ?? "";
-  const byName = STEPS.findIndex(({ id }) => id === named);
-  if (byName >= 0) return byName;
-  const number = Number(named);
-  return Number.isInteger(number) && number >= 1 && number <= STEPS.length ? number - 1 : -1;
+  return STEPS.findIndex(({ id }) => id === (NUMBERED[Number(named) - 1] ?? named));
 }

@@ -2,28 +2,33 @@
 // Invariant: a shared arm changes only after a click: a link to a step shows the step, and waits for Start. In the page in one
 // file the arm belongs to the page, so the step begins at once.
 
-import { remember, setScene } from "./actions.js";
-import { Chart, drawBars, drawErrors, drawMap, drawPicture, ROOMY } from "./chart.js";
-import { followEnergy, ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
-import { announce, byId, el, passFocus, setAddress, setAttribute, setText } from "./dom.js";
+import { beginAnew, remember, setScene } from "./actions.js";
+import { Chart, drawBars, drawErrors, drawMap, drawPicture, drawResponses, ROOMY } from "./chart.js";
+import { followEnergy, KEPT, ofLimit, nothingSeen, shrinks, SOFT, stepIn, STEPS, stepsIn, WEAK } from "./course.js";
+import { announce, byId, el, goToAddress, keepChoice, passFocus, remembered, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
-import { duration, inPageNames, METHODS, multipleOf, partOf, seconds, shortName } from "./format.js";
+import { duration, fixed, inPageNames, METHODS, multipleOf, partOf, seconds, shortName, significant } from "./format.js";
 import { ENERGY, newest, record, VELOCITY } from "./history.js";
-import { MOVE_TO, rungs } from "./ladder.js";
-import { drawLadder, settingsKey } from "./ladder_panel.js";
+import { moveOf, rungs } from "./ladder.js";
+import { drawLadder, keyOf, presentMove } from "./ladder_panel.js";
 import { isAlone, linksIn } from "./kernel.js";
 import { latestOnly } from "./latest.js";
-import { controlPeriodLimit, limitInForce, question as loopQuestion, stepsPerUpdate, verdict } from "./policy.js";
-import { rollout, setGains, setIntegrator, setParams, setPeriod, setState, step as stepArm } from "./runtime.js";
+import { drawMotions, FAILING, motionOf, motionsOf } from "./motions.js";
+import { controlPeriodLimit, verdict } from "./policy.js";
+import { fromRest, questionOf, stepsPerUpdate } from "./question.js";
+import { connectionText } from "./readouts.js";
+import { pause, rollout, setGains, setIntegrator, setMotors, setParams, setPeriod, setState, step as stepArm } from "./runtime.js";
+import { judge, keep as keepResponse, LASTS, nameOf, present, shown } from "./responses.js";
 import { LogScale } from "./scale.js";
 import { SCENES, settingsOf } from "./scenes.js";
 import { DEFAULTS, fromFragment, hasSettings } from "./settings.js";
 import { showForm } from "./sheet.js";
 import { state, watch, watchAll } from "./store.js";
-import { ENERGIES, StripChart } from "./strip_chart.js";
+import { StripChart } from "./strip_chart.js";
 import { climb, climbRows, deviation } from "./study.js";
 import { Surface } from "./surface.js";
 
+const FIRST = 0.5; // s: in this time of a response its settings are read
 const SHAKES = 2; // rad/s: a visible speed beyond the limit
 const LOOK_MS = 500;
 const STEPS_SHOWN = 40; // measurements shown in slow motion
@@ -31,7 +36,7 @@ const ROWS = 13; // of the map's border
 const SPAN = 5; // s of the strip chart
 const ALL_JOINTS = [true, true, true];
 const MASSES = [0.5, 1, 2]; // of the last link [kg]
-const DIVERGED = "The arm diverged. Press “Restart step”.";
+const DIVERGED = "The arm diverged. Change a setting, or press “Restart the arm”.";
 
 /** The map's axes: control period [s], and damping gains as a multiple of the usual ones. */
 const PERIODS = new LogScale(1e-3, 2e-2, [1, 2, 5, 10, 20].map((ms) => [1e-3 * ms, `${ms} ms`]));
@@ -41,17 +46,27 @@ const FACTORS = new LogScale(0.25, 4, [0.25, 0.5, 1, 2, 4].map((one) => [one, `$
  * @typedef {object} ChartOfStep
  * @property {() => string} caption
  * @property {() => void} [draw] on the surface; nothing where the step has no chart
- * @property {(common: any) => Promise<void>} [ask] for what it shows, with what every question to the study says
+ * @property {(loop: import("./question.js").Question) => Promise<void>} [ask] for what it shows, about a loop from rest
  */
 /** @type {Record<string, ChartOfStep>} */
 const CHARTS = {
   velocity: { caption: () => "Speed of the joints [rad/s]", draw: strip([{ column: VELOCITY }]) },
-  energy: { caption: () => "Energy [J]", draw: strip(ENERGIES) },
+  energy: { caption: () => "Energy lost or gained since the start [J]", draw: strip([{ column: ENERGY, color: "ink" }], { level: 0 }) },
   bars: { caption: () => "A tiny push, at each measurement", draw: () => drawBars(surface, now.bars), ask: askBars },
-  errors: { caption: () => `Two errors of one move: ${shortName(state.integrator?.method)}, control period ${duration(period())}`, draw: () => drawErrors(surface, now.errors), ask: askErrors },
+  errors: {
+    caption: () => `Two errors of one move: ${shortName(state.integrator?.method)}, control period ${duration(period())}`,
+    draw: () => drawErrors(surface, now.errors), ask: askErrors,
+  },
+  responses: {
+    caption: () => "Joint 1 comes up to its setpoint",
+    draw: () => {
+      stripTime = newest();
+      drawResponses(surface, now.responses, present(), state.setpoint[0], LASTS);
+    },
+  },
   map: { caption: () => "Which period is stable", draw: paintMap, ask: askMap },
   ladder: { caption: () => "Error over run time", draw: () => drawLadder(surface, now.runs) },
-  pictures: { caption: () => "Thirty-nine scenes" },
+  pictures: { caption: () => now.scene || "Twelve scenes", draw: paintMotions },
   form: { caption: () => "My arm" },
 };
 
@@ -72,13 +87,38 @@ function anew() {
     bars: /** @type {number[]} */ ([]),
     errors: /** @type {{error: number | null, sampling: number | null} | null} */ (null),
     firstError: NaN,
+    responses: /** @type {import("./responses.js").Response[]} */ ([]),
+    response: "", // the settings of the present one; empty if they changed on the way, and once it is kept
     runs: /** @type {import("./ladder.js").Rung[]} */ ([]),
     runsKey: "", // the settings of `runs`
     asked: "", // the settings of the chart
+    loop: /** @type {any} */ (null), // the question of the chart
     border: /** @type {import("./chart.js").Row[]} */ ([]),
     scene: "", // the sentence of the started scene
+    motions: /** @type {import("./motions.js").Motion[]} */ ([]), // of the started scene
+    played: 0, // the time since they began [ms]
     borderAsked: "", // the arm and the gains without damping of the border
   };
+}
+
+/** The steps whose task was done once. The browser keeps them, and a link carries them. @type {Set<string>} */
+const ticks = new Set();
+const TICKS = "pendularm-done";
+
+/** @param {...string} ids */
+function tick(...ids) {
+  for (const id of ids) ticks.add(id);
+  keepChoice(TICKS, [...ticks].join(","));
+  for (const [i, { id, title }] of STEPS.entries()) {
+    const button = byId("course-steps").children[i];
+    button.classList.toggle("done", ticks.has(id));
+    setAttribute(button, "aria-label", `Step ${i + 1}: ${title}${ticks.has(id) ? ", done" : ""}`);
+  }
+}
+
+/** The ticks in the form of a link; empty without one. */
+export function ticksInLink() {
+  return ticks.size > 0 ? `done=${[...ticks].join(",")}&` : "";
 }
 
 export function startCourse() {
@@ -86,20 +126,28 @@ export function startCourse() {
   byId("course-back").addEventListener("click", () => go(at - 1));
   byId("course-next").addEventListener("click", () => go(at + 1));
   byId("course-start").addEventListener("click", begin);
+  byId("course-again").addEventListener("click", again);
   byId("course-steps").append(...STEPS.map((one, i) => el("button", {
-    type: "button", class: "small", "aria-label": `Step ${i + 1}: ${one.title}`, title: one.title, onclick: () => go(i),
+    type: "button", class: "small", "data-step": one.id, "aria-label": `Step ${i + 1}: ${one.title}`, title: one.title, onclick: () => go(i),
   }, String(i + 1))));
+  tick(...stepsIn(remembered(TICKS)), ...stepsIn(new URLSearchParams(location.hash.slice(1)).get("done")));
   at = Math.max(0, stepIn(location.hash));
   watch("links", open);
-  watch("connection", rest);
+  let before = "";
+  watch("connection", (connection) => {
+    // A silent server still has the scene.
+    if ([before, connection].includes("silent") && [before, connection].includes("open")) show();
+    else rest();
+    before = connection;
+  });
   watchAll(look);
   rest();
 }
 
 /** Opens the step that a new address names. */
 export function followLink() {
-  if (stepIn(location.hash) < 0) return;
-  at = stepIn(location.hash);
+  if (stepIn(location.hash) < 0 && location.hash !== "") return;
+  at = Math.max(0, stepIn(location.hash));
   open();
 }
 
@@ -110,7 +158,7 @@ function open() {
 
 /** The present step in the form of a link; empty in the workbench. */
 export function stepInLink() {
-  return state.view === "course" ? `step=${at + 1}&` : "";
+  return state.view === "course" ? `step=${STEPS[at].id}&` : "";
 }
 
 /** The number of links of the arm in this page, in the form of a link; empty if the address does not name it there. */
@@ -140,7 +188,7 @@ function rest() {
 function go(to) {
   if (to < 0 || to >= STEPS.length) return;
   at = to;
-  setAddress(`#${[`step=${at + 1}`, linksInLink()].filter(Boolean).join("&")}`);
+  goToAddress(`#${[`step=${STEPS[at].id}`, linksInLink()].filter(Boolean).join("&")}`);
   begin();
   byId("course-title").focus();
 }
@@ -154,9 +202,11 @@ async function begin() {
   if (!now.began) return;
   remember();
   const { scene, offset, paused, title, text } = STEPS[at];
-  const refused = await setScene(scene(state.links), paused === true);
+  // An arm that starts elsewhere is not yet moving there.
+  const refused = await setScene(scene(state.links), paused === true || offset !== undefined);
   if (mine !== now) return;
   if (offset) await setState(offset.slice(0, state.links));
+  if (offset && !paused) await pause(false);
   if (mine !== now) return;
   setText(byId("course-status"), refused);
   now.ready = true;
@@ -166,14 +216,39 @@ async function begin() {
   if (paused) slowMotion(mine);
 }
 
-/** The arm takes two control steps a second. */
+/** Restarts the arm of the step, with the present settings. */
+async function again() {
+  const { offset, paused } = STEPS[at];
+  if (!offset) return void await beginAnew();
+  await pause(true);
+  await beginAnew();
+  await setState(offset.slice(0, state.links));
+  if (!paused) await pause(false);
+}
+
+/** The arm takes two control steps a second. It begins again after some, with another period, and when it has diverged. */
 async function slowMotion(mine) {
-  for (let k = 0; k < STEPS_SHOWN && mine === now;) {
+  let [taken, at] = [0, period()];
+  while (mine === now) {
     await new Promise((done) => setTimeout(done, LOOK_MS));
-    if (mine !== now || state.view !== "course" || !state.paused || document.hidden) continue;
+    if (mine !== now || state.view !== "course" || !state.paused || document.hidden || state.connection !== "open") continue;
+    if (taken >= STEPS_SHOWN || at !== period() || state.diverged) {
+      [taken, at] = [0, period()];
+      await again();
+    }
     await stepArm(stepsPerUpdate(state));
-    k += 1;
+    taken += 1;
   }
+}
+
+/**
+ * Changes a setting in a step. The arm begins anew if it has diverged, and where the chart is of the whole motion since the start.
+ * @param {Promise<{result: boolean, status: string, values: any}>} change
+ */
+async function changed(change) {
+  const answer = await change;
+  if (answer.result && (state.diverged || ["energy", "responses"].includes(STEPS[at].chart))) await again();
+  return answer;
 }
 
 /** The control period [s]. */
@@ -200,14 +275,18 @@ function show() {
   setText(byId("course-title"), one.title);
   setText(byId("course-text"), one.text);
   const lost = state.connection !== "open";
-  setText(byId("course-status"), state.links === 0 || now.began ? "" : lost ? "The connection is lost. The page reconnects by itself." : `Press “Start” to set the arm.${isAlone ? "" : " Other viewers see the change."}`);
+  const start = `Press “Start” to set the arm.${isAlone ? "" : " Other viewers see the change."}`;
+  setText(byId("course-status"), connectionText() || (state.links === 0 || now.began ? "" : start));
   setText(byId("course-start"), now.began ? "Restart step" : "Start");
   if (lost) passFocus(byId("course-start"), byId("course-title"));
   byId("course-start").disabled = state.links === 0 || lost;
   byId("course-back").disabled = at === 0;
   byId("course-next").disabled = at === STEPS.length - 1;
-  [...byId("course-steps").children].forEach((button, i) => { if (i === at) button.setAttribute("aria-current", "step"); else button.removeAttribute("aria-current"); });
-  byId("course-chart").hidden = !CHARTS[one.chart].draw;
+  [...byId("course-steps").children].forEach((button, i) => {
+    if (i === at) button.setAttribute("aria-current", "step");
+    else button.removeAttribute("aria-current");
+  });
+  byId("course-chart").hidden = !CHARTS[one.chart].draw || one.chart === "pictures";
   markOutdated(false);
   byId("course-extra").replaceChildren();
   if (state.links > 0) fillExtra(one);
@@ -221,17 +300,41 @@ function fillExtra(one) {
   const place = byId("course-extra");
   if (one.methods) {
     place.append(el("div", { class: "buttons course-methods", role: "group", "aria-label": "method" }, ...METHODS.map(([method]) => el("button", {
-      type: "button", "data-method": method, "aria-pressed": String(method === state.integrator?.method), onclick: () => setIntegrator({ method }),
+      type: "button", "data-method": method, "aria-pressed": String(method === state.integrator?.method), onclick: () => changed(setIntegrator({ method })),
     }, shortName(method)))));
   }
+  if (one.chart === "responses") place.append(motorButtons());
   if (one.chart === "map") {
     place.append(el("div", { class: "buttons", role: "group", "aria-label": "mass of the last link" }, ...MASSES.map((mass) => el("button", {
-      type: "button", class: "small", "data-mass": mass, onclick: () => setParams({ masses: [...state.params.masses.slice(0, -1), mass] }),
+      type: "button", class: "small", "data-mass": mass, onclick: () => changed(setParams({ masses: [...state.params.masses.slice(0, -1), mass] })),
     }, `last link ${mass} kg`))));
   }
-  if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure", onclick: ({ target }) => busy(target, "Measuring…", measure) }, "Measure"));
+  if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure",
+    onclick: ({ target }) => busy(target, "Measuring…", measure) }, "Measure"));
   if (one.chart === "pictures") place.append(gallery(state.links));
   if (one.chart === "form") showForm(place, () => { now.seen.sheet = true; look(); });
+}
+
+/** The effort limit, and what the integral does at it. */
+function motorButtons() {
+  const choices = [["no limit", null, "clamp"], ["no cure", WEAK, "none"], ["conditional", WEAK, "conditional"],
+    ["back-calculation", WEAK, "back_calculation"]];
+  const set = (weak, anti_windup) => changed(setMotors({ effort: weak && weak[state.links], anti_windup }));
+  return el("div", { class: "buttons", role: "group", "aria-label": "effort limit and anti-windup" }, ...choices.map(([name, weak, anti]) => el("button", {
+    type: "button", class: "small", "data-motors": JSON.stringify([weak !== null, anti]), disabled: !state.motors, onclick: () => set(weak, anti),
+  }, weak ? `${weak[state.links][0]} N m, ${name}` : name)));
+}
+
+/** The three gains of joint 1. The other joints have them in proportion. */
+function gainFields() {
+  const ranges = /** @type {Record<string, [string, number, number]>} */ ({
+    kp: ["N m/rad", 20, 2000], ki: ["N m/(rad s)", 2, 2000], kd: ["N m s/rad", 5, 200] });
+  return Object.entries(ranges).map(([key, [unit, low, high]]) => {
+    const base = SOFT[state.links][key];
+    const commit = (value) => changed(setGains({ [key]: base.map((one) => Number(((value * one) / base[0]).toPrecision(6))) }));
+    const field = numberField({ label: `${key} of joint 1`, short: key, unit, low, high, log: true, zero: key === "ki", commit });
+    return { element: field.element, show: () => field.accept(state.gains[key][0]) };
+  });
 }
 
 /** Pictures of the scenes, by number of links: made once. @type {Record<number, HTMLElement>} */
@@ -239,13 +342,20 @@ const galleries = {};
 
 /** @param {number} links */
 function gallery(links) {
-  galleries[links] ??= el("div", { class: "pictures" }, ...SCENES.map((scene) => {
+  galleries[links] ??= el("div", {}, ...pictures(SCENES.filter(({ id }) => id in FAILING), links),
+    el("details", {}, el("summary", {}, "All thirty-nine scenes"), ...pictures(SCENES.filter(({ id }) => !(id in FAILING)), links)));
+  return galleries[links];
+}
+
+/** Those for the present arm come first. @param {import("./scenes.js").Scene[]} scenes @param {number} links */
+function pictures(scenes, links) {
+  return [el("div", { class: "pictures" }, ...scenes.toSorted((one, other) => Number(other.links === links) - Number(one.links === links)).map((scene) => {
     const canvas = el("canvas", { "aria-hidden": "true" });
     const { text, act } = offer(scene, links);
     new Surface(canvas, (surface) => drawPicture(surface, scene));
-    return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: act === null, onclick: act }, canvas, el("span", {}, scene.name), el("small", {}, text));
-  }));
-  return galleries[links];
+    return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: act === null, onclick: act }, canvas,
+      el("span", {}, scene.name), el("small", {}, text));
+  }))];
 }
 
 /**
@@ -273,23 +383,53 @@ async function runScene(scene) {
   const settings = settingsOf(scene);
   const refused = await setScene({ ...settings, controller: settings.controller ?? false }, false);
   if (mine !== now) return;
-  await setState(scene.start, scene.velocity);
+  const start = scene.watch?.start ?? scene.start;
+  await setState(start, scene.velocity);
+  now.motions = [];
+  if (!refused) showMotions(scene, mine);
   now.scene = refused ? `Refused: ${refused}` : `${scene.name}: ${scene.expected}`;
   if (!refused) now.seen.scenes.add(scene.id);
   look();
+}
+
+/** Computes the correct and the failing motion of a scene, and plays them. */
+async function showMotions(scene, mine) {
+  const { correct, failing } = motionsOf(scene);
+  const wanted = [correct, failing];
+  const answers = await Promise.all(wanted.map(({ question, run }) => rollout(question, run)));
+  if (mine !== now || !answers.every(({ result }) => result)) return;
+  mine.motions = answers.map(({ values }, k) => motionOf(wanted[k], values, k === 0, PLAYED_MS / 1e3));
+  mine.played = performance.now();
+  byId("course-chart").hidden = false;
+  surface.redraw();
+}
+
+/** The clock at which a motion is over [ms], and how often it is played. */
+const PLAYED_MS = 6000;
+const ROUNDS = 3;
+
+function paintMotions() {
+  const part = (performance.now() - now.played) / PLAYED_MS;
+  drawMotions(surface, now.motions, part < ROUNDS ? part % 1 : 1);
+  if (part < ROUNDS) requestAnimationFrame(() => { if (now.motions.length > 0) surface.redraw(); });
 }
 
 /** The clock of a step: its slider, its present value and its limit [ms]. */
 function clock(one) {
   if (one.dial !== "timestep") {
     return {
-      label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => setPeriod({ period: seconds(ms) }), value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state),
-      fit: (ms) => multipleOf(1e3 * state.integrator.timestep, ms), rule: "it must be a whole number of timesteps",
+      label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => changed(setPeriod({ period: seconds(ms) })),
+      value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state), fit: (ms) => multipleOf(1e3 * state.integrator.timestep, ms),
+        rule: "it must be a whole number of timesteps",
     };
   }
-  // In the chart of errors the period does not change.
-  const whole = one.chart === "errors" ? { high: 4, fit: (ms) => partOf(1e3 * (state.period?.period ?? 0), ms), rule: "it must divide the control period" } : { high: 100 };
-  return { label: "timestep", unit: "ms", low: 0.1, ...whole, commit: (ms) => setIntegrator({ timestep: seconds(ms) }), value: () => 1e3 * (state.integrator?.timestep ?? NaN), limit: () => 1e3 * limitInForce(state).limit };
+  // In the chart of errors the period does not change. Energy has no limit: a stable method may lose it.
+  const whole = one.chart === "errors"
+    ? { high: 4, fit: (ms) => partOf(1e3 * (state.period?.period ?? 0), ms), rule: "it must divide the control period" } : { high: 100 };
+  return {
+    label: "timestep", unit: "ms", low: 0.1, ...whole, commit: (ms) => changed(setIntegrator({ timestep: seconds(ms) })),
+    value: () => 1e3 * (state.integrator?.timestep ?? NaN), limit: () => NaN,
+  };
 }
 
 /** The one slider of a step, with its mark. */
@@ -301,8 +441,15 @@ function makeDial(one) {
   // While the scene is being set, its values would replace the student's.
   place.inert = now.began && !now.ready;
   if (!one.dial || state.links === 0) return;
+  if (one.dial === "gains") {
+    const fields = gainFields();
+    place.append(...fields.map(({ element }) => element));
+    dial = { show: () => { for (const field of fields) if (state.gains) field.show(); } };
+    return dial.show();
+  }
   const { value, limit, ...options } = one.dial === "damping"
-    ? { label: "damping gains", unit: "times", low: FACTORS.low, high: FACTORS.high, commit: (factor) => setGains({ kd: damped(factor) }), value: damping, limit: () => NaN }
+    ? { label: "damping gains", unit: "times", low: FACTORS.low, high: FACTORS.high, commit: (factor) => changed(setGains({ kd: damped(factor) })),
+      value: damping, limit: () => NaN }
     : clock(one);
   const field = numberField({ log: true, ...options });
   dial = { show: () => { field.accept(Number(value().toPrecision(6))); field.mark(one.guess && !now.ticked ? NaN : limit()); } };
@@ -312,22 +459,63 @@ function makeDial(one) {
 
 function showBig() {
   const one = STEPS[at];
-  const { label, value, limit } = clock(one);
-  const unknown = one.guess && !now.ticked;
   const { kind } = verdict(state);
   const hidden = !one.dial || !now.began || (one.guess && now.guessed < 0);
   byId("course-big").hidden = hidden;
-  setText(byId("course-figure"), hidden ? "" : ofLimit(value(), unknown ? NaN : limit()));
-  setText(byId("course-what"), label);
+  const { figure, what, judged } = one.chart === "energy" ? bigEnergy() : one.chart === "responses" ? bigResponse() : bigClock(one, kind);
+  setText(byId("course-figure"), hidden ? "" : figure);
+  setText(byId("course-what"), what);
   const caption = CHARTS[one.chart].caption();
   setText(byId("course-caption"), caption);
   setAttribute(byId("course-chart"), "aria-label", caption);
-  byId("course-big").classList.toggle("good", !unknown && ["stable", "here"].includes(kind));
-  byId("course-big").classList.toggle("bad", !unknown && ["beyond", "never", "diverged"].includes(kind));
+  byId("course-big").classList.toggle("good", judged === "good");
+  byId("course-big").classList.toggle("bad", judged === "bad");
+  byId("course-again").hidden = !(now.ready && kind === "diverged" && one.chart !== "pictures");
   const status = byId("course-status");
-  if (now.scene) setText(status, kind === "diverged" ? `${now.scene} This simulation diverged.` : now.scene);
+  if (now.scene) setText(status, kind === "diverged" ? `${now.scene} The live arm diverged.` : now.scene);
   else if (kind === "diverged" && one.chart !== "pictures") setText(status, DIVERGED);
   else if (status.textContent === DIVERGED) setText(status, "");
+}
+
+/** A time and its limit, and whether it is stable. */
+function bigClock(one, kind) {
+  const { label, value, limit } = clock(one);
+  const unknown = (one.guess && !now.ticked) || Number.isNaN(limit());
+  const judged = unknown ? "" : ["stable", "here"].includes(kind) ? "good" : ["beyond", "never", "diverged"].includes(kind) ? "bad" : "";
+  return { figure: ofLimit(value(), unknown ? NaN : limit()), what: label, judged };
+}
+
+/** The energy since the start of the swing, which is 0 there. */
+function bigEnergy() {
+  const energy = record.length > 0 ? record.data[record.last() + ENERGY] : NaN;
+  const judged = Number.isNaN(energy) ? "" : Math.abs(energy) <= KEPT ? "good" : "bad";
+  return { figure: `${energy >= 0.005 ? "+" : ""}${fixed(energy, 2)} J`, what: "energy since the start", judged };
+}
+
+/** How far the arm has passed its setpoint. */
+function bigResponse() {
+  const points = present();
+  const { overshoot, error } = judge(points, state.setpoint[0]);
+  const isOver = state.time >= LASTS;
+  const figure = points.length > 0 ? `${significant(overshoot < 0.0005 ? 0 : overshoot, 2)} rad` : "–";
+  return { figure, what: isOver ? `overshoot; ${significant(error, 2)} rad from the setpoint after ${LASTS} s` : "overshoot so far", judged: "" };
+}
+
+/** Keeps the response once it is complete, and says what the responses have shown. */
+function lookAtResponse(seen) {
+  if (!state.gains) return;
+  const name = nameOf(state.gains, state.motors);
+  // A motion belongs to the settings of its start, if they have stayed.
+  if (state.time < FIRST) now.response = name;
+  else if (now.response !== name || state.enabled !== true || state.diverged) now.response = "";
+  if (now.response === "" || state.time < LASTS) return;
+  now.response = "";
+  const points = present();
+  now.responses = keepResponse(now.responses, { gains: state.gains, motors: state.motors, name, points, ...judge(points, state.setpoint[0]) });
+  const found = shown(now.responses);
+  for (const key of Object.keys(seen.responses)) seen.responses[key] ||= found[key];
+  const words = Object.keys(seen.responses).filter((key) => seen.responses[key]);
+  setText(byId("course-status"), words.length > 0 ? `Shown: ${words.join(", ")}.` : "");
 }
 
 function showTask() {
@@ -343,9 +531,14 @@ function showTask() {
   if (place.dataset.shown === key) return;
   place.dataset.shown = key;
   place.replaceChildren();
-  if (guess && began && guessed < 0) ask(place, guess, -1, (k) => { now.guessed = k; show(); byId("course-dial").querySelector("input")?.focus({ preventScroll: true }); });
+  if (guess && began && guessed < 0) ask(place, guess, -1, (k) => {
+    now.guessed = k;
+    show();
+    byId("course-dial").querySelector("input")?.focus({ preventScroll: true });
+  });
   else if (ticked) {
-    if (guess) place.append(el("p", { class: "note" }, `${guessed === guess.right ? "Your guess was right." : `You guessed ${guess.answers[guessed]}.`} ${guess.because}`));
+    if (guess) place.append(el("p", { class: "note" },
+      `${guessed === guess.right ? "Your guess was right." : `You guessed ${guess.answers[guessed]}.`} ${guess.because}`));
     ask(place, question, answered, (k) => {
       now.answered = k;
       showTask();
@@ -382,12 +575,15 @@ function look() {
   seen.shook ||= state.enabled && period() > controlPeriodLimit(state) && (fastest > SHAKES || kind === "diverged");
   seen.stable = state.enabled === true && period() < controlPeriodLimit(state) && kind !== "diverged" && sceneIsSet;
   if (one.methods && one.chart === "velocity" && !sceneIsSet) seen.methods.clear();
-  if (one.chart === "energy" && state.enabled === false && state.integrator.timestep >= one.scene(state.links).integrator.timestep && record.length > 0) {
-    seen.energy = followEnergy(seen.energy, JSON.stringify([state.integrator, state.params]), newest(), record.data[record.last() + ENERGY]);
+  if (one.chart === "energy" && state.enabled === false && record.length > 0) {
+    const of = JSON.stringify([state.integrator, state.params]);
+    seen.energy = followEnergy(seen.energy, of, state.integrator.timestep, newest(), record.data[record.last() + ENERGY]);
   }
+  if (one.chart === "responses") lookAtResponse(seen);
   refresh(one);
   if (!now.ticked && one.task.done(seen)) {
     now.ticked = true;
+    tick(one.id);
     announce("Done.");
     if (dial) dial.show();
     showBig();
@@ -399,22 +595,29 @@ function look() {
 function showChosen() {
   const { method } = /** @type {any} */ (state.integrator);
   const mass = state.params?.masses.at(-1);
-  for (const button of byId("course-extra").querySelectorAll("[data-method], [data-mass]")) {
-    setAttribute(button, "aria-pressed", String((button.dataset.method ?? method) === method && Number(button.dataset.mass ?? mass) === mass));
+  const motors = JSON.stringify([Boolean(state.motors?.effort), state.motors?.anti_windup]);
+  for (const button of byId("course-extra").querySelectorAll("[data-method], [data-mass], [data-motors]")) {
+    const { dataset } = button;
+    const isChosen = (dataset.method ?? method) === method && Number(dataset.mass ?? mass) === mass && (dataset.motors ?? motors) === motors;
+    setAttribute(button, "aria-pressed", String(isChosen));
   }
 }
 
 /** Requests the chart's data again, when its settings have changed. */
 function refresh({ chart }) {
-  if (now.runs.length > 0 && now.runsKey !== settingsKey()) {
+  if (now.runs.length > 0 && now.runsKey !== keyOf(presentMove())) {
     now.runs = [];
     surface.redraw();
   }
-  const key = JSON.stringify([loopQuestion(state), state.integrator, period()]);
-  if (key === now.asked || !CHARTS[chart].ask) return;
-  now.asked = key;
+  // The charts are about the controller, which holds the stretched arm.
+  const present = questionOf({ ...state, enabled: true, setpointKnown: true });
+  if (!present || !CHARTS[chart].ask) return;
+  const loop = fromRest({ ...present, setpoint: present.setpoint.map(() => 0) });
+  const key = JSON.stringify([loop, period()]);
+  if (key === now.asked) return;
+  Object.assign(now, { asked: key, loop });
   markOutdated(true);
-  inquire({ ask: CHARTS[chart].ask, mine: now, key });
+  inquire({ ask: CHARTS[chart].ask, mine: now, key, loop });
 }
 
 /** A chart of earlier settings is faint until the study has answered. */
@@ -422,28 +625,26 @@ function markOutdated(/** @type {boolean} */ outdated) {
   byId("course-chart").classList.toggle("outdated", outdated);
 }
 
-const inquire = latestOnly(async ({ ask, mine, key }) => {
+const inquire = latestOnly(async ({ ask, mine, key, loop }) => {
   if (mine !== now) return;
-  const { params, gains, integrator: { method, timestep } } = state;
-  await ask({ params, gains, integrator: method, timestep, control_period: state.period?.period ?? 0 });
+  await ask(loop);
   if (mine === now && key === now.asked) markOutdated(false);
   surface.redraw();
   look();
 }, 60);
 
-async function askBars(common) {
+async function askBars(loop) {
   const mine = now;
-  const rest = new Array(state.links).fill(0);
   // Without gravity, so only the push is visible. It is a push of the velocity, which excites the fastest motion of the
   // loop.
-  const bars = await deviation({ ...common, params: { ...state.params, gravity: 0 }, setpoint: rest }, rest, period());
+  const bars = await deviation({ ...loop, params: { ...loop.params, gravity: 0 } }, loop.q, period());
   mine.bars = bars ?? [];
-  mine.seen.shrinks = shrinks(bars);
+  mine.seen.shrinks = shrinks(mine.bars);
 }
 
-async function askErrors(common) {
+async function askErrors(loop) {
   const mine = now;
-  const { result, values } = await rollout({ ...common, q0: new Array(state.links).fill(0), setpoint: MOVE_TO[state.links], duration: 2, samples: 101, reference: true });
+  const { result, values } = await rollout(moveOf(loop), { duration: 2, samples: 101, reference: true });
   if (!result) {
     mine.errors = null;
     return;
@@ -454,37 +655,43 @@ async function askErrors(common) {
 }
 
 /** The border of the map. The damping moves the dot, not the border. */
-async function askMap() {
+async function askMap(loop) {
   const mine = now;
-  const about = () => JSON.stringify([state.params, state.gains.kp, state.gains.ki]);
-  const key = about();
+  const question = { ...loop, integrator: "rk4", control_period: 0 };
+  const key = borderKey(loop);
   if (key === mine.borderAsked) return;
   Object.assign(mine, { borderAsked: key, border: [] });
-  const { params, gains } = state;
-  const setpoint = new Array(state.links).fill(0);
-  const ask = (factor) => ({ params, gains: { ...gains, kd: damped(factor) }, setpoint, integrator: "rk4" });
-  await climbRows(FACTORS, ROWS, ask, () => mine === now && key === about(), (factor, values) => {
+  const ask = (factor) => ({ ...question, gains: { ...question.gains, kd: damped(factor) } });
+  await climbRows(FACTORS, ROWS, ask, () => mine === now && key === borderKey(mine.loop), (factor, values) => {
     mine.border.push({ factor, limit: values.control_period_limit ?? Infinity });
     surface.redraw();
   });
 }
 
+/** What the border depends on: all of the loop but the damping and the clocks. */
+function borderKey({ params, gains, delay }) {
+  return JSON.stringify([params, gains.kp, gains.ki, delay]);
+}
+
 async function measure() {
   const mine = now;
-  const key = settingsKey();
+  const move = presentMove();
+  if (!move) return;
+  const key = keyOf(move);
   Object.assign(now, { runs: [], runsKey: key });
-  const refused = await climb(1, () => mine === now && key === settingsKey(), (rung) => { mine.runs.push(rung); surface.redraw(); });
+  const isWanted = () => mine === now && key === keyOf(presentMove());
+  const refused = await climb(move, 1, isWanted, (rung) => { mine.runs.push(rung); surface.redraw(); });
   setText(byId("course-status"), inPageNames(refused));
   mine.seen.measured = mine.runs.length === rungs().length;
   look();
 }
 
-/** A function that draws the last seconds. @param {import("./strip_chart.js").Series[]} series */
-function strip(series) {
+/** A function that draws the last seconds. @param {import("./strip_chart.js").Series[]} series @param {{level?: number}} [more] */
+function strip(series, more) {
   const chart = new StripChart(series, 0.2, 300);
   return () => {
     stripTime = newest();
-    chart.draw(surface, { now: stripTime || 0, span: SPAN, links: state.links, shown: ALL_JOINTS, across: "simulation time [s]" });
+    chart.draw(surface, { now: stripTime || 0, span: SPAN, links: state.links, shown: ALL_JOINTS, across: "simulation time [s]", ...more });
   };
 }
 

@@ -40,6 +40,15 @@ export function setAddress(address) {
   }
 }
 
+/** The same as a new entry of the history, so that the browser's Back leads to the present one. @param {string} address */
+export function goToAddress(address) {
+  try {
+    history.pushState(history.state, "", address);
+  } catch {
+    // then it does not change
+  }
+}
+
 /** Call this before `place` disappears or is disabled: if the focus is in it, it moves to `next`, and not to the start of the page. */
 export function passFocus(place, next = byId("arm")) {
   if (place.contains(document.activeElement)) next.focus({ preventScroll: true });

@@ -86,7 +86,8 @@ export function withoutFigure(status) {
  * @param {(value: number) => number} [options.fit] the value that is sent for a chosen one @param {string} [options.rule] the reason for it
  * @param {string} [options.className] of the slider
  */
-export function numberField({ label, short = label, unit, low, high, log = false, zero = false, zeroText = "", commit, fit = (value) => value, rule = "", className = "" }) {
+export function numberField({ label, short = label, unit, low, high, log = false, zero = false, zeroText = "", commit, fit = (value) => value,
+  rule = "", className = "" }) {
   const id = `field-${nextId}`;
   nextId += 1;
   const input = el("input", { type: "number", step: "any", id, inputmode: "decimal", autocomplete: "off" });
@@ -188,9 +189,11 @@ export function numberField({ label, short = label, unit, low, high, log = false
  * placeholder?: string, choices?: [string, string][]}} options
  */
 export function option({ label, unit = "", value = "", placeholder = "", choices = [] }) {
-  const input = choices.length > 0 ? el("select", {}, ...choices.map(([name, text]) => el("option", { value: name }, text))) : el("input", { type: "number", step: "any", inputmode: "decimal", autocomplete: "off", value, placeholder });
+  const input = choices.length > 0 ? el("select", {}, ...choices.map(([name, text]) => el("option", { value: name }, text)))
+    : el("input", { type: "number", step: "any", inputmode: "decimal", autocomplete: "off", value, placeholder });
   return {
-    element: el("label", { class: "option" }, el("span", {}, label), el("span", { class: "with-unit" }, input, ...(unit ? [el("span", { class: "unit" }, unit)] : []))),
+    element: el("label", { class: "option" }, el("span", {}, label),
+      el("span", { class: "with-unit" }, input, ...(unit ? [el("span", { class: "unit" }, unit)] : []))),
     input,
     /** `undefined` if the field is empty, NaN if its text is no number. */
     number: () => (input.validity.badInput ? NaN : input.value === "" ? undefined : Number(input.value)),

@@ -50,7 +50,8 @@ const SHOWN = { data: "controller", effort: "torque", epsilon: "tolerance", peri
 /** A refusal with the page's names: "mass 1 must be a number", not "params.masses[0] must be a number, got null". @param {string} status */
 export function inPageNames(status) {
   return status.replace(/\b(?:gains|params)\./g, "").replace(/\b(\w+)\[(\d)\]/g, (_, name, i) => `${SINGULAR[name] ?? name} ${Number(i) + 1}`)
-    .replace(/(^|; )(\w+)/g, (_, before, name) => before + (SHOWN[name] ?? name)).replace(/must be true or false/g, "must be on or off").replace(/, got null(?=;|$)/g, "");
+    .replace(/(^|; )(\w+)/g, (_, before, name) => before + (SHOWN[name] ?? name))
+    .replace(/must be true or false/g, "must be on or off").replace(/, got null(?=;|$)/g, "");
 }
 
 /** A number for an input field: four digits, with an integer exponent. @param {number} value */

@@ -61,7 +61,8 @@ function pushNow(sign) {
 
 export function startKeyboard() {
   const rows = shortcuts.map(([key, text]) => el("tr", {}, el("td", {}, el("kbd", {}, key === " " ? "space" : key)), el("td", {}, text)));
-  rows.push(el("tr", {}, el("td", {}, el("kbd", {}, "← ↑ ↓ →")), el("td", {}, "in the view: move the choice beside “drag”; with shift, the setpoint")));
+  rows.push(el("tr", {}, el("td", {}, el("kbd", {}, "← ↑ ↓ →")),
+    el("td", {}, "in the view: move the choice beside “drag”; with shift, the setpoint")));
   byId("help-keys").append(...rows);
   byId("help-button").addEventListener("click", toggleHelp);
   byId("help-close").addEventListener("click", toggleHelp);

@@ -4,15 +4,35 @@
 // has figures up to its end, with its time.
 
 import { duration, fixed, METHODS, shortName, significant } from "./format.js";
+import { fromRest, isFree } from "./question.js";
 
-/** Timesteps from long to short, each half of the previous one [s]. */
-export const TIMESTEPS = Array.from({ length: 8 }, (_, k) => 0.032 / 2 ** k);
+/** @typedef {import("./question.js").Question} Question */
 
-/** @typedef {{method: string, timestep: number, error: number | null, sampling: number | null, uncertainty: number | null, wall: number, evaluations: number, divergedAt: number | null}} Rung */
+/** The most timesteps in a series, and the shortest one of a usual control period [s]. */
+const MOST = 8;
+const SHORTEST = 1e-4;
+const LEAST = 4;
 
-/** All runs, the cheapest first, so the picture grows steadily. @returns {{method: string, timestep: number}[]} */
-export function rungs() {
-  return TIMESTEPS.flatMap((timestep) => METHODS.map(([method]) => ({ method, timestep })));
+/**
+ * Timesteps from long to short, each half of the previous one [s]. All divide the control period, because the effective period would
+ * differ otherwise, and with it the controller. A period of 0 is every step.
+ */
+export function timestepsFor(period = 0) {
+  const all = Array.from({ length: MOST }, (_, k) => (period > 0 ? period : 0.032) / 2 ** k);
+  return all.filter((timestep, k) => timestep >= SHORTEST || k < LEAST);
+}
+
+/**
+ * @typedef {{method: string, timestep: number, error: number | null, sampling: number | null, uncertainty: number | null, wall:
+ * number, evaluations: number, divergedAt: number | null}} Rung
+ */
+
+/**
+ * All runs, the cheapest first, so the picture grows steadily. @param {number} [period] of the controller [s] @returns {{method:
+ * string, timestep: number}[]}
+ */
+export function rungs(period = 0) {
+  return timestepsFor(period).flatMap((timestep) => METHODS.map(([method]) => ({ method, timestep })));
 }
 
 /**
@@ -56,14 +76,19 @@ export function total({ error, sampling }) {
 /** The measured move, always the same so that results can be compared: from rest, stretched out. @type {Record<number, number[]>} */
 export const MOVE_TO = { 2: [0.9, -1.3], 3: [0.9, -1.3, 0.8] };
 
-/** A text for the move, with the settings that its result depends on. */
-export function stamp(/** @type {any} */ { links, enabled, params, gains, period }, /** @type {number} */ seconds) {
+/** The measured move of a loop; a free arm swings from the same start. @param {Question} question @returns {Question} */
+export function moveOf(question) {
+  return { ...fromRest(question), ...(isFree(question.gains) ? {} : { setpoint: MOVE_TO[question.q.length] }) };
+}
+
+/** A text for a move from rest, with the settings that its result depends on. @param {Question} move @param {number} seconds */
+export function stamp({ params, gains, setpoint, control_period: period, delay }, seconds) {
   const list = (/** @type {number[]} */ values) => values.map((one) => significant(one, 3)).join(", ");
   const arm = `masses ${list(params.masses)} kg, lengths ${list(params.lengths)} m, gravity ${significant(params.gravity, 3)} m/s²`;
   const start = `${seconds} s from rest, stretched out`;
-  if (!enabled) return `Free swing, ${start}; ${arm}.`;
-  const clock = period?.period > 0 ? `every ${duration(period.period)}` : "at every step";
-  return `Move to (${list(MOVE_TO[links])}) rad, ${start}; controller ${clock}, kp ${list(gains.kp)}, ki ${list(gains.ki)}, kd ${list(gains.kd)}; ${arm}.`;
+  if (isFree(gains)) return `Free swing, ${start}; ${arm}.`;
+  const clock = `${period > 0 ? `every ${duration(period)}` : "at every step"}${delay ? ", delayed" : ""}`;
+  return `Move to (${list(setpoint)}) rad, ${start}; controller ${clock}, kp ${list(gains.kp)}, ki ${list(gains.ki)}, kd ${list(gains.kd)}; ${arm}.`;
 }
 
 /** The uncertainty of the reference [rad]; null if no run has it. @param {Rung[]} rungs */
@@ -122,7 +147,8 @@ export function describeRun(run, away, seconds) {
   const isJudged = ended === null && run.times.every((_, k) => away[k] != null);
   return {
     name: shortName(run.method),
-    outcome: ended !== null ? `diverged at t = ${fixed(ended, 2)} s` : !isJudged ? "–" : parts === undefined ? `within ${PARTED} rad` : `${PARTED} rad off from ${fixed(parts, 2)} s on`,
+    outcome: ended !== null ? `diverged at t = ${fixed(ended, 2)} s` : !isJudged ? "–" : parts === undefined ? `within ${PARTED} rad`
+      : `${PARTED} rad off from ${fixed(parts, 2)} s on`,
     energy: ended !== null || !Number.isFinite(gained) ? "–" : `${significant(gained, 3)} J`,
     error: isJudged ? `${significant(Math.max(...away.map(Number)), 3)} rad` : "–",
     evaluations: significant(run.evaluations, 6),

@@ -5,7 +5,8 @@ import { Chart, DASHED, line, STRONG, TEXT, write } from "./chart.js";
 import { announce, byId, fillTable, setText } from "./dom.js";
 import { busy, option, panel } from "./field.js";
 import { duration, methodName, METHODS, shortName, significant } from "./format.js";
-import { cheapest, errorText, stamp, TIMESTEPS, uncertaintyOf } from "./ladder.js";
+import { cheapest, errorText, moveOf, stamp, timestepsFor, uncertaintyOf } from "./ladder.js";
+import { loopKey, questionOf } from "./question.js";
 import { LogScale, powerOfTen } from "./scale.js";
 import { state, watch } from "./store.js";
 import { climb } from "./study.js";
@@ -31,13 +32,18 @@ export function startLadder() {
   said = panel(byId("ladder-form"), [seconds], [["Measure", () => busy(said.buttons[0], "Measuring…", measure), { type: "submit", class: "primary" }]]);
   setText(byId("ladder-text"), INVITATION);
   // The measurement belongs to another loop.
-  watch(["links", "params", "gains", "period", "enabled"], () => { if (asked && asked !== settingsKey()) forget(INVITATION); });
+  watch(["links", "params", "gains", "period", "enabled"], () => { if (asked && asked !== keyOf(presentMove())) forget(INVITATION); });
 }
 
-/** All settings that a measurement depends on, as a text. */
-export function settingsKey() {
-  const { links, params, gains, period, enabled } = state;
-  return JSON.stringify([links, params, enabled, enabled ? [gains, period?.period, period?.delay] : null]);
+/** The measured move of the active loop; null until its settings are known. */
+export function presentMove() {
+  const question = questionOf({ ...state, setpointKnown: true }); // the move has its own
+  return question && moveOf(question);
+}
+
+/** What a measurement of a move depends on, as a text. */
+export function keyOf(/** @type {import("./question.js").Question | null} */ move) {
+  return move ? loopKey(move) : "";
 }
 
 /** Shows no figure, and ignores pending ones. @param {string} text the text in its place */
@@ -51,39 +57,46 @@ function forget(text) {
 }
 
 async function measure() {
-  if (state.links === 0 || !state.params) {
+  const move = presentMove();
+  if (!move || state.connection !== "open") {
     said.show("There is no arm to measure: not connected.");
     return;
   }
   said.show("");
   forget("");
   const mine = running;
-  asked = settingsKey();
+  asked = keyOf(move);
   const length = seconds.number() ?? SECONDS;
-  const about = stamp(state, length);
-  const refused = await climb(length, () => mine === running, (rung) => { found.push(rung); surface.redraw(); });
+  const about = stamp(move, length);
+  const refused = await climb(move, length, () => mine === running, (rung) => { found.push(rung); surface.redraw(); });
   if (mine !== running) return;
   said.show(refused);
-  describe(about);
+  describe(about, timestepsFor(move.control_period));
 }
 
-function describe(about) {
+/** @param {string} about the move @param {number[]} timesteps [s] */
+function describe(about, timesteps) {
   const text = found.length > 0 ? `${inWords(cheapest(found, WANTED))} ${about}` : INVITATION;
   setText(byId("ladder-text"), text);
   if (found.length === 0) return;
   announce(text);
   fillTable(byId("ladder-table"), ["timestep", ...METHODS.map(([method], i) => [shortName(method), `method${i + 1}`])],
-    TIMESTEPS.map((timestep) => [duration(timestep), ...METHODS.map(([method]) => cellOf(method, timestep))]));
+    timesteps.map((timestep) => [duration(timestep), ...METHODS.map(([method]) => cellOf(method, timestep))]));
 }
 
 /** @param {Rung[]} best the cheapest sufficient run of each method */
 function inWords(best) {
   const controlled = found.some(({ sampling }) => sampling !== null);
-  const meaning = controlled ? " Solid lines: error of the method. Dashed lines: distance from a controller without a hold. The table shows both [rad]: method + hold." : " The table shows the errors [rad].";
-  if (best.length === 0) return `No run ${controlled ? "keeps both errors" : "came"} within ${WANTED} rad${controlled ? "" : " of the exact motion"}.${meaning}`;
+  const meaning = controlled
+    ? " Solid lines: error of the method. Dashed lines: distance from a controller without a hold. The table shows both [rad]: method + hold."
+    : " The table shows the errors [rad].";
+  if (best.length === 0) {
+    return `No run ${controlled ? "keeps both errors" : "came"} within ${WANTED} rad${controlled ? "" : " of the exact motion"}.${meaning}`;
+  }
   const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
   const uncertainty = uncertaintyOf(found);
-  return `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} of run time, at a timestep of ${duration(cheap.timestep)}.${meaning}`
+  return `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} of run time, at a timestep of `
+    + `${duration(cheap.timestep)}.${meaning}`
     + (uncertainty === null ? "" : ` The reference itself is known to ${significant(uncertainty, 1)} rad.`);
 }
 
@@ -101,7 +114,8 @@ export function drawLadder(surface, found) {
   const runs = found.filter(({ wall }) => wall > 0);
   const errors = runs.flatMap(({ error, sampling }) => [error ?? 0, sampling ?? 0]).filter((error) => error > 0);
   if (errors.length === 0) return write(context, "no measurement yet", width / 2, height / 2, "center");
-  const chart = new Chart(surface, LogScale.around(runs.map(({ wall }) => wall), 6, duration), LogScale.around(errors, 8, powerOfTen), ROOM);
+  const [across, up] = [LogScale.around(runs.map(({ wall }) => wall), 6, duration), LogScale.around(errors, 8, powerOfTen)];
+  const chart = new Chart(surface, across, up, ROOM);
   chart.frame({ across: "run time", up: "error [rad]" });
   METHODS.forEach(([method], i) => {
     const color = colors.methods[i];

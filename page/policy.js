@@ -2,6 +2,20 @@
 // Invariant: a figure is used only for the loop of its request. Until the answer arrives there is none.
 
 import { duration, fixed, methodName, METHODS, significant } from "./format.js";
+import { isFree, loopKey, questionOf, stepsPerUpdate } from "./question.js";
+
+/** @typedef {import("./question.js").Question} Question */
+/** @typedef {import("./question.js").Gains} Gains */
+/**
+ * The page's state, as far as a verdict depends on it.
+ * @typedef {import("./question.js").Live & {
+ *   connection: string, diagnostics: any, limits: Limits, broken: Question | null,
+ * }} State
+ */
+/**
+ * The study's answers about one loop, by method, and the first limit and speed of the motion since the last reset [s, rad/s].
+ * @typedef {{loop: string, answers: Record<string, any>, motions: Record<string, {limit: number, speed?: number}>}} Limits
+ */
 
 /** @typedef {"offline" | "diverged" | "unknown" | "never" | "beyond" | "here" | "stable"} Kind */
 /**
@@ -23,22 +37,12 @@ const SHARE = 0.8;
 const AFTER_DIVERGENCE = 0.5;
 /** If the energy of a free swing takes longer to double, other errors matter first [s]. */
 const SLOW_GROWTH = 600;
+const HALVINGS = 50;
 
-/** The active loop in the form of a request to the study, for one method. With the controller off it is the free arm. */
-export function question(/** @type {any} */ { links, integrator, gains, params, enabled, setpoint, setpointKnown, period }) {
-  if (!integrator || !gains || !params || enabled == null || gains.kp.length !== links) return null;
-  return {
-    params,
-    gains: enabled ? gains : noGains(links),
-    ...(enabled && period?.period > 0 ? { control_period: period.period } : {}),
-    ...(enabled && setpointKnown ? { setpoint: Array.from(setpoint.subarray(0, links)) } : {}),
-  };
-}
-
-/** The study's answer for a method, if it belongs to the active loop; otherwise null. */
-export function answerInForce(/** @type {any} */ state, /** @type {string} */ method = state.integrator?.method) {
-  const asked = question(state);
-  return asked && state.limits.loop === JSON.stringify(asked) ? state.limits.answers[method] ?? null : null;
+/** The study's answer for a method, if it belongs to the active loop; otherwise null. @param {State} state */
+export function answerInForce(state, method = state.integrator?.method ?? "") {
+  const asked = questionOf(state);
+  return asked && state.limits.loop === loopKey(asked) ? state.limits.answers[method] ?? null : null;
 }
 
 /** Relative changes of a limit that are ignored. */
@@ -57,14 +61,15 @@ function open(served) {
 }
 
 /** The limit of the active loop with a method [s], and its pose or speed. */
-export function limitInForce(/** @type {any} */ state, /** @type {string} */ method = state.integrator?.method) {
+export function limitInForce(/** @type {State} */ state, method = state.integrator?.method ?? "") {
   const answer = answerInForce(state, method);
   const free = !acts(state);
   const { links } = state;
-  if (!answer) return { limit: NaN, where: "", place: "", everyPose: NaN, everyPoseAtRest: NaN, advised: NaN };
+  if (!answer || !state.params) return { limit: NaN, where: "", place: "", everyPose: NaN, everyPoseAtRest: NaN, advised: NaN };
   const diverged = state.diagnostics?.state === "diverged";
-  const held = free && doublingTime(method, state.integrator.timestep, answer) > SLOW_GROWTH ? Infinity : heldLimit(state, answer);
-  const fast = diverged || state.integrator?.timestep > held || periodIsTooLong(state, answer);
+  const timestep = judged(state)?.timestep ?? NaN;
+  const held = free ? Math.max(heldLimit(state, answer), slowGrowthLimit(method, answer)) : heldLimit(state, answer);
+  const fast = diverged || timestep > held || periodIsTooLong(state, answer);
   // An arm that has diverged or shakes is fast because of that. Of a free arm the earlier motion counts, which comes again
   // after a reset. A controlled arm then begins at rest.
   const before = free ? state.limits.motions[method] : undefined;
@@ -73,7 +78,9 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   const pose = answer.equilibrium ?? (free ? null : state.setpoint.subarray(0, links));
   const named = pose ? `(${Array.from(pose, (q) => fixed(q, 2)).join(", ")}) rad` : "";
   const places = {
-    setpoint: `at the setpoint ${named}`, sagging: `at the pose to which it sags, ${named}`, saddle: `at the pose to which it falls, ${named}`,
+    setpoint: `at the setpoint ${named}`,
+    sagging: `at the pose to which it sags, ${named}`,
+    saddle: `at the pose to which it falls, ${named}`,
     hanging: state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns",
     unstable: free ? `at ${named}` : `at ${named}, which these gains cannot hold`,
   };
@@ -91,23 +98,42 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
     everyPose: Math.min(motion, everyPoseAtRest),
     everyPoseAtRest,
     // Never the timestep at which the arm has just diverged.
-    advised: diverged ? Math.min(usual, AFTER_DIVERGENCE * state.integrator.timestep) : usual,
+    advised: diverged ? Math.min(usual, AFTER_DIVERGENCE * timestep) : usual,
   };
 }
 
-/** The timestep's limit at the present control period. If the period itself is too long, a shorter timestep does not help, and the limit of a law at every step is used. */
-function heldLimit(/** @type {any} */ state, /** @type {any} */ answer) {
-  const own = open(answer.timestep_limit);
-  return state.period?.period > 0 && answer.timestep_limit !== undefined && own > 0 ? own : open(answer.timestep_limit_held);
+/**
+ * Method and timestep that a verdict is about: the present ones or, once the arm has diverged, those at which it did. The latter are
+ * null if they are unknown, or if they were those of another loop.
+ * @param {State} state
+ */
+function judged(state) {
+  if (state.diagnostics?.state !== "diverged") return state.integrator;
+  const [then, now] = [state.broken, questionOf(state)];
+  return then && now && loopKey(then) === loopKey(now) ? { method: then.integrator, timestep: then.timestep } : null;
 }
 
-/** Stores an answer of the study about the active loop, whose text is `asked`. */
-export function keepAnswer(/** @type {any} */ state, /** @type {string} */ asked, /** @type {string} */ method, /** @type {any} */ answer) {
-  if (state.limits.loop !== asked) state.limits = { loop: asked, answers: {}, motions: {} };
+/**
+ * The timestep's limit at the present control period. If the period itself is too
+ * long, a shorter timestep does not help, and the limit of a law at every step is used.
+ */
+function heldLimit(/** @type {State} */ state, /** @type {any} */ answer) {
+  const own = open(answer.timestep_limit);
+  return Number(state.period?.period) > 0 && answer.timestep_limit !== undefined && own > 0 ? own : open(answer.timestep_limit_held);
+}
+
+/**
+ * Stores an answer of the study to a question about the active loop.
+ * @param {State} state @param {Question} asked @param {any} answer
+ */
+export function keepAnswer(state, asked, answer) {
+  const method = asked.integrator;
+  if (state.limits.loop !== loopKey(asked)) state.limits = { loop: loopKey(asked), answers: {}, motions: {} };
   const { answers, motions } = state.limits;
   answers[method] = answer;
   // Only a free arm's earlier motion counts. A diverging simulation is fast because of that, even at the first answer.
-  if (answer && !acts(state) && state.diagnostics?.state !== "diverged") motions[method] ??= { limit: open(answer.timestep_limit_motion), speed: answer.motion_speed };
+  if (!answer || acts(state) || state.diagnostics?.state === "diverged") return;
+  motions[method] ??= { limit: open(answer.timestep_limit_motion), speed: answer.motion_speed };
 }
 
 /**
@@ -121,8 +147,27 @@ export function doublingTime(/** @type {string} */ method, /** @type {number} */
   return (Math.LN2 * timestep) / Math.log1p(method === "euler" ? z * z : z ** 4 / 4);
 }
 
-/** The limit of the control period [s]: 0 if no stable one was found, Infinity if no limit was, NaN unknown, as while no controller acts. */
-export function controlPeriodLimit(/** @type {any} */ state) {
+/**
+ * The timestep up to which the energy of Midpoint's fastest small free swing doubles in no less than `SLOW_GROWTH` [s]; 0 for other
+ * methods. Midpoint's growth falls with the third power of the timestep, so other errors matter first. Euler's falls with the first.
+ * @param {string} method @param {any} answer
+ */
+function slowGrowthLimit(method, answer) {
+  if (method !== "midpoint" || answer.timestep_limit_held !== 0 || !answer.critical) return 0;
+  let [low, high] = [0, 1 / answer.critical.frequency];
+  for (let halving = 0; halving < HALVINGS; halving += 1) {
+    const middle = (low + high) / 2;
+    if (doublingTime(method, middle, answer) > SLOW_GROWTH) low = middle;
+    else high = middle;
+  }
+  return low;
+}
+
+/**
+ * The limit of the control period [s]: 0 if no stable one was found, Infinity if no limit was, NaN unknown, as while no controller acts.
+ * @param {State} state
+ */
+export function controlPeriodLimit(state) {
   const answer = answerInForce(state);
   return answer && acts(state) ? periodLimitIn(state, answer) : NaN;
 }
@@ -136,24 +181,21 @@ function periodLimitIn(/** @type {any} */ { period }, /** @type {any} */ answer)
   return period?.delay ? NaN : open(answer.timestep_limit_held);
 }
 
-/** Whether a controller moves the arm. */
-function acts(/** @type {any} */ { enabled, gains }) {
+/** Whether a controller moves the arm. @param {State} state */
+function acts({ enabled, gains }) {
   return enabled === true && gains != null && !isFree(gains);
 }
 
-/** Whether the control law runs too rarely. */
-function periodIsTooLong(/** @type {any} */ state, /** @type {any} */ answer) {
-  const steps = stepsPerUpdate(state);
-  return acts(state) && (steps > 1 || state.period?.delay) && steps * state.integrator.timestep > periodLimitIn(state, answer);
+/** Whether the control law runs too rarely. @param {State} state @param {any} answer */
+function periodIsTooLong(state, answer) {
+  const integrator = judged(state);
+  if (!integrator || !acts(state)) return false;
+  const steps = stepsPerUpdate({ period: state.period, integrator });
+  return (steps > 1 || state.period?.delay === true) && steps * integrator.timestep > periodLimitIn(state, answer);
 }
 
-/** Timesteps per control update, as in the runtime: at least 1. */
-export function stepsPerUpdate(/** @type {any} */ { period, integrator }) {
-  return Math.max(1, Math.round((period?.period ?? 0) / integrator.timestep));
-}
-
-/** A short text for the present control period; empty if the control law runs at every step without a delay. */
-export function periodText(/** @type {any} */ state) {
+/** A short text for the present control period; empty if the control law runs at every step without a delay. @param {State} state */
+export function periodText(state) {
   const { period, integrator } = state;
   if (!period || !integrator) return "";
   const steps = stepsPerUpdate(state);
@@ -161,11 +203,12 @@ export function periodText(/** @type {any} */ state) {
   return [...often, ...(period.delay ? ["delayed"] : [])].join(", ");
 }
 
-/** @returns {Verdict} */
-export function verdict(/** @type {any} */ state) {
+/** @param {State} state @returns {Verdict} */
+export function verdict(state) {
   const own = limitInForce(state);
-  const { timestep = NaN } = state.integrator ?? {};
-  const steps = acts(state) && state.integrator ? stepsPerUpdate(state) : 1;
+  const integrator = judged(state);
+  const { timestep = NaN } = integrator ?? {};
+  const steps = acts(state) && integrator ? stepsPerUpdate({ period: state.period, integrator }) : 1;
   const periodLimit = steps > 1 || (acts(state) && state.period?.delay) ? controlPeriodLimit(state) : Infinity;
   // Each clock has its own limit. The sentence is about the control period, unless only the timestep is too long.
   const slow = steps > 1 && (steps * timestep > periodLimit || !(timestep > own.limit));
@@ -173,15 +216,16 @@ export function verdict(/** @type {any} */ state) {
   const where = slow ? own.place : own.where;
   const limit = Number.isNaN(own.limit) ? NaN : slow ? periodLimit : steps > 1 ? own.limit : Math.min(own.limit, periodLimit);
   const everyPose = slow ? Math.min(periodLimit, own.everyPoseAtRest) : own.everyPose;
-  // A smaller timestep does not make the control period shorter.
-  const offered = !slow && own.advised > 0 && own.advised < timestep ? own.advised : NaN;
+  // A smaller timestep does not make the control period shorter. Nothing is offered that is in force already.
+  const present = Math.min(timestep, state.integrator?.timestep ?? NaN);
+  const offered = !slow && own.advised > 0 && own.advised < present ? own.advised : NaN;
   const known = { limit, where, advised: offered, slow };
   const at = slow ? `A control period of ${duration(time)}` : duration(time);
   const name = slow ? "the limit" : own.name;
   const above = excess(at, time, `${name} ${duration(limit)}`, limit, where);
   if (state.connection !== "open") return { kind: "offline", pill: "no connection", sentence: "", ...known };
   if (state.diagnostics?.state === "diverged") {
-    const sentence = above || (limit > 0 ? `${at} was too long for this motion.` : "");
+    const sentence = !integrator ? (state.broken ? "Other settings are in force now." : "") : above || (limit > 0 ? `${at} was too long for this motion.` : "");
     return { kind: "diverged", pill: "diverged", sentence, ...known };
   }
   if (Number.isNaN(limit) || Number.isNaN(timestep)) return { kind: "unknown", pill: "limit unknown", sentence: "", ...known };
@@ -189,7 +233,9 @@ export function verdict(/** @type {any} */ state) {
     return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? `beyond ${name}` : "no stable timestep", sentence: above, ...known };
   }
   if (time > everyPose) {
-    const others = everyPose > 0 ? `other poses are stable only up to ${duration(everyPose)}: on the way there the arm may shake` : "for other poses no stable timestep is known, because of the gains";
+    const others = everyPose > 0
+      ? `other poses are stable only up to ${duration(everyPose)}: on the way there the arm may shake`
+      : "for other poses no stable timestep is known, because of the gains";
     const sentence = `${at} is stable ${where}, but ${others}.`;
     return { kind: "here", pill: "stable here only", sentence, ...known };
   }
@@ -197,7 +243,11 @@ export function verdict(/** @type {any} */ state) {
   return { kind: "stable", pill: "stable", sentence, ...known };
 }
 
-/** Why a time is too long; empty if it is not. @param {string} at the text of the time @param {number} time @param {string} named the limit in words @param {number} limit @param {string} where */
+/**
+ * Why a time is too long; empty if it is not.
+ * @param {string} at the text of the time @param {number} time @param {string} named the limit in words @param {number} limit
+ * @param {string} where
+ */
 function excess(at, time, named, limit, where) {
   if (!(time > limit)) return "";
   return limit > 0
@@ -228,7 +278,7 @@ function afterReset(answer) {
   return safe > 0 ? SHARE * safe : NaN;
 }
 
-/** @typedef {Record<string, number>} Limits largest stable timestep of each method [s] */
+/** @typedef {Record<string, number>} Timesteps largest stable timestep of each method [s] */
 
 /** Limits within this factor count as equal. */
 const ALIKE = 1.15;
@@ -239,11 +289,11 @@ const FLIP = 2;
 const NEARLY = 0.99;
 
 /** The reason for the limit of the present method; empty until the limits of all methods are known. */
-export function whyText(/** @type {any} */ state) {
+export function whyText(/** @type {State} */ state) {
   const answers = METHODS.map(([method]) => answerInForce(state, method));
   if (!answers.every(Boolean)) return "";
   const limits = Object.fromEntries(METHODS.map(([method], i) => [method, open(answers[i].timestep_limit_held)]));
-  const { method } = state.integrator;
+  const { method = "" } = state.integrator ?? {};
   const answer = answerInForce(state, method);
   const limit = limits[method];
   if (!acts(state)) return whyFree(answer, method, limit);
@@ -258,10 +308,14 @@ export function whyText(/** @type {any} */ state) {
 function whyFree({ critical }, method, limit) {
   if (limit === 0) return `Why: nothing damps the free arm. With ${methodName(method)} even a small swing grows, however short the step is.`;
   if (limit === Infinity || !critical) return "";
-  return `Why: beyond ${duration(limit)} ${methodName(method)} no longer follows the fastest small swing of the free arm. Wide and fast swings may need shorter steps.`;
+  return `Why: beyond ${duration(limit)} ${methodName(method)} no longer follows the fastest small swing of the free arm. Wide and fast swings `
+    + `may need shorter steps.`;
 }
 
-/** The reason for the limit of a loop with a controller: the motion that grows first beyond the smallest limit of all poses. @param {any} answer @param {number} limit */
+/**
+ * The reason for the limit of a loop with a controller: the motion that grows first beyond the smallest limit of all poses.
+ * @param {any} answer @param {number} limit
+ */
 export function cause({ critical, minimum_over_poses_held: least, equilibrium_kind, timestep_limit_continuous }, limit) {
   if (limit === 0) {
     return equilibrium_kind === "unstable" || timestep_limit_continuous === 0
@@ -272,30 +326,20 @@ export function cause({ critical, minimum_over_poses_held: least, equilibrium_ki
   const joint = `joint ${critical.joint + 1}`;
   const percent = significant(100 * (critical.growth_per_step - 1), 2);
   const flips = critical.frequency * FLIP * BEYOND * least > NEARLY;
-  if (flips) return `${joint} is the fastest. A torque that is held longer overshoots: 10 % beyond the limit the deviation flips at every step and grows by ${percent} %.`;
-  return `a swing of ${joint} at ${significant(critical.frequency, 3)} Hz grows first: the torque comes too late and drives it. A higher derivative gain may help.`;
+  if (flips) return `${joint} is the fastest. A torque that is held longer overshoots: 10 % beyond the limit the deviation flips at every step `
+    + `and grows by ${percent} %.`;
+  return `a swing of ${joint} at ${significant(critical.frequency, 3)} Hz grows first: the torque comes too late and drives it. A higher `
+    + `derivative gain may help.`;
 }
 
-/** @param {Limits} limits */
+/** @param {Timesteps} limits */
 export function others(limits) {
   const finite = Object.values(limits);
   const [least, most] = [Math.min(...finite), Math.max(...finite)];
-  if (most <= ALIKE * least) return "A better method hardly helps here, because the controller acts only once a step. It makes the simulated motion more exact.";
+  if (most <= ALIKE * least) return "A better method hardly helps here, because the controller acts only once a step. It makes the simulated "
+    + "motion more exact.";
   const best = METHODS.filter(([method]) => limits[method] > most / ALIKE).map(([, name]) => name);
   return `${best.join(", ")}: ${most === Infinity ? "no limit was found" : `stable up to ${limitText(most)}`}.`;
-}
-
-/** @typedef {{gravity: number, masses: number[], lengths: number[]}} Arm */
-/** @typedef {{kp: number[], ki: number[], kd: number[]}} Gains */
-
-/** @param {Gains} gains */
-export function isFree(gains) {
-  return [...gains.kp, ...gains.ki, ...gains.kd].every((one) => one === 0);
-}
-
-/** @param {number} n @returns {Gains} */
-export function noGains(n) {
-  return { kp: new Array(n).fill(0), ki: new Array(n).fill(0), kd: new Array(n).fill(0) };
 }
 
 /** @param {Gains} gains @param {number} factor @returns {Gains} */

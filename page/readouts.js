@@ -12,7 +12,8 @@ export function startReadouts() {
   watch("connection", (now) => {
     const pill = byId("connection");
     pill.className = `pill ${now}`;
-    setText(byId("connection-text"), { open: isAlone ? "in this page, no server" : "connected", connecting: "connecting…", lost: "reconnecting…" }[now]);
+    const open = isAlone ? "in this page, no server" : "connected";
+    setText(byId("connection-text"), { open, connecting: "connecting…", lost: "reconnecting…", silent: "no answer" }[now]);
   });
   watch(LOOP, showLimit);
 }
@@ -49,7 +50,8 @@ function showLimit() {
   byId("out-limit").classList.toggle("bad", bad);
   setText(byId("out-every"), state.enabled === false ? "–" : limitText(everyPose));
   const answer = state.enabled ? answerInForce(state) : null;
-  setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? answer.bound_is_proven ? "proven" : "bounded" : "found");
+  setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? answer.bound_is_proven ? "proven"
+    : "bounded" : "found");
   byId("out-every").title = answer?.worst_pose ? `at (${answer.worst_pose.map((q) => fixed(q, 2)).join(", ")}) rad` : "";
   byId("out-every").classList.toggle("warn", said.kind === "here");
 }
@@ -66,7 +68,21 @@ export function describeArm() {
   if (state.links === 0 || !state.params) return;
   const { x, y } = endEffector();
   const degrees = Array.from(state.position.subarray(0, state.links), (q) => fixed((q * 180) / Math.PI, 0));
-  const goal = state.goal?.outcome === "active" ? ` Target at x ${fixed(state.goal.target.x, 2)}, y ${fixed(state.goal.target.y, 2)} metres, ${fixed(state.goal.distance, 2)} metres away.` : "";
+  const goal = state.goal?.outcome === "active" ? ` Target at x ${fixed(state.goal.target.x, 2)}, y ${fixed(state.goal.target.y, 2)} metres, `
+    + `${fixed(state.goal.distance, 2)} metres away.` : "";
   setText(byId("arm-text"), `${state.links} links, ${runState()}, controller ${state.enabled ? "on" : "off"}. Joints at ${degrees.join(", ")} degrees. `
     + `End effector at x ${fixed(x, 2)}, y ${fixed(y, 2)} metres.${goal}`);
+}
+
+/** Attempts to connect before the page says what may be wrong. */
+export const MANY = 3;
+
+/** Why the page has no arm, and what may help; empty while it has one. */
+export function connectionText() {
+  const { connection, failures, links } = state;
+  if (connection === "open") return "";
+  if (connection === "silent") return "No answer from the arm. The figures are old.";
+  const text = links > 0 ? "Connection lost. Trying again…" : "Connecting to the arm…";
+  if (failures < MANY || isAlone) return text;
+  return `${text} The server may be stopped. Or it refuses pages of this address: then start it with --allow-origin ${location.origin}`;
 }

@@ -8,6 +8,13 @@ const CALL_TIMEOUT_MS = 15000;
 /** Most calls that wait for an answer, so that memory is bounded without answers. */
 const MOST_CALLS = 256;
 
+/** The address of the runtime's WebSocket: the folder of the page, which a proxy may serve under a path. @param {string} page its address */
+export function socketAddress(page) {
+  const address = new URL(".", page);
+  address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
+  return address.href;
+}
+
 export class Rosbridge {
   /**
    * @param {() => WebSocket | import("./kernel.js").Kernel} dial opens a connection
@@ -21,6 +28,8 @@ export class Rosbridge {
     this.calls = new Map(); // id -> { settle, timer }
     this.nextId = 1;
     this.retryMs = FIRST_RETRY_MS;
+    this.failures = 0; // attempts in a row without a connection
+    this.heard = -Infinity; // the time of the last frame [ms]
     /** @type {(text: string) => void} */
     this.onStatus = () => {};
     this.connect();
@@ -36,6 +45,8 @@ export class Rosbridge {
     this.socket = socket;
     socket.onopen = () => {
       this.retryMs = FIRST_RETRY_MS;
+      this.failures = 0;
+      this.heard = performance.now();
       // Errors about published messages are shown, but over WebSocket they must be requested. `values`
       // of a refused call are the present values, not the text of `status`.
       this.send({ op: "set_level", level: "error", errors: "object" });
@@ -48,6 +59,7 @@ export class Rosbridge {
 
   lost() {
     for (const id of [...this.calls.keys()]) this.answer(id, failure("the connection was lost"));
+    this.failures += 1;
     this.onState("lost");
     const wait = this.retryMs * (0.75 + 0.5 * Math.random()); // many pages must not reconnect at the same time
     this.retryMs = Math.min(2 * this.retryMs, LAST_RETRY_MS);
@@ -55,6 +67,7 @@ export class Rosbridge {
   }
 
   receive(text) {
+    this.heard = performance.now();
     let frame;
     try {
       frame = JSON.parse(text);

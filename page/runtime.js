@@ -5,8 +5,9 @@ import { announce, warn } from "./dom.js";
 import { inPageNames, METHODS } from "./format.js";
 import { Kernel, isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
-import { answerInForce, keepAnswer, motionHasChanged, question } from "./policy.js";
-import { Rosbridge } from "./rosbridge.js";
+import { answerInForce, keepAnswer, motionHasChanged } from "./policy.js";
+import { gainsArgs, loopKey, questionOf, rolloutArgs, stabilityArgs } from "./question.js";
+import { Rosbridge, socketAddress } from "./rosbridge.js";
 import { MOST_LINKS, nothingAsked, set, state, tell, watch } from "./store.js";
 
 /** Other clients change settings too, and no topic reports it. */
@@ -21,6 +22,8 @@ const HIDDEN_MS = 100;
 const TOUCHED_MS = 300;
 /** Time for a computation or a search [ms]. */
 const LONG_CALL_MS = 120000;
+/** A runtime that sends nothing for this time does not answer. It sends diagnostics once a second [ms]. */
+const SILENT_MS = 3000;
 /** Many setpoints may arrive per second. The study is asked about the latest. */
 const STABILITY_MS = 200;
 /** Default radius within which a goal counts as reached [m], as in the runtime. */
@@ -36,8 +39,7 @@ let beforeChange = () => {};
 export function start(whenReset, whenChanging) {
   onReset = whenReset;
   beforeChange = whenChanging;
-  const scheme = location.protocol === "https:" ? "wss" : "ws";
-  const dial = isAlone ? () => new Kernel() : () => new WebSocket(`${scheme}://${location.host}/`);
+  const dial = isAlone ? () => new Kernel() : () => new WebSocket(socketAddress(location.href));
   bridge = new Rosbridge(dial, connection);
   bridge.onStatus = (text) => warn(inPageNames(text));
   bridge.subscribe("/joint_states", jointStates);
@@ -47,8 +49,8 @@ export function start(whenReset, whenChanging) {
   bridge.subscribe("/ik_action/result", goalResult);
   bridge.subscribe("/ik_trial/status", (msg) => set("trial", msg));
   pace();
-  setInterval(poll, POLL_MS);
-  watch(["integrator", "gains", "params", "enabled", "setpoint", "links"], askStability);
+  setInterval(() => { listen(); poll(); }, POLL_MS);
+  watch(["integrator", "gains", "params", "friction", "motors", "period", "enabled", "setpoint", "links"], askStability);
   watch(["params", "enabled"], () => {
     set("pushed", false);
     if (state.goal?.outcome === "reached") set("goal", null); // the arm is not at the goal any more
@@ -73,13 +75,22 @@ function touch() {
   setTimeout(pace, TOUCHED_MS);
 }
 
+/** A server may keep its connection and say nothing, for example while it is stopped by a signal. */
+function listen() {
+  const isSilent = performance.now() - bridge.heard > SILENT_MS;
+  if (state.connection === "open" && isSilent) set("connection", "silent");
+  else if (state.connection === "silent" && !isSilent) set("connection", "open");
+}
+
 function connection(now) {
   const before = state.connection;
+  state.failures = bridge?.failures ?? 0;
   set("connection", now);
   if (now === "open") {
     // It may be another or a restarted runtime, so all old values are discarded.
     state.setpointKnown = false;
     set("limits", nothingAsked());
+    set("diagnostics", null);
     set("goal", null);
     set("trial", null);
     onReset();
@@ -173,6 +184,8 @@ function diagnostics(msg) {
   if (report.state !== "diverged") keep("paused", report.state === "paused");
   // Limits of an arm that diverges are those of its wild motion.
   if (before === "diverged" && report.state !== before) set("limits", nothingAsked());
+  // The settings at a divergence are known only if the page has seen it.
+  if (report.state !== before) state.broken = report.state === "diverged" && before ? questionOf(state) : null;
   set("diagnostics", report);
   keep("diverged", report.state === "diverged");
   if (motionHasChanged(answerInForce(state), report)) askNow();
@@ -207,6 +220,8 @@ function poll() {
   setIntegrator({});
   setGains({});
   setPeriod({});
+  setFriction({});
+  setMotors({});
   pause();
   enable();
   askStability();
@@ -235,6 +250,8 @@ export const setParams = (args) => settings("/arm_sim/set_params", args, (values
 export const setIntegrator = (args) => settings("/arm_sim/set_integrator", args, (values) => keep("integrator", values));
 export const setGains = (args) => settings("/pid_controller/set_gains", args, (values) => keep("gains", values));
 export const setPeriod = (args) => settings("/pid_controller/set_period", args, (values) => keep("period", values));
+export const setFriction = (args) => settings("/arm_sim/set_friction", args, (values) => keep("friction", values));
+export const setMotors = (args) => settings("/pid_controller/set_limits", args, (values) => keep("motors", values));
 export const enable = (data) => settings("/pid_controller/enable", data === undefined ? {} : { data }, (values) => keep("enabled", values.data));
 export const disturb = (effort, seconds) => bridge.call("/arm_sim/disturb", { effort, duration: seconds });
 export const solve = (target) => bridge.call("/ik/solve", target);
@@ -242,10 +259,15 @@ export const cancelGoal = () => bridge.call("/ik_action/cancel_goal");
 export const trialStart = (args) => bridge.call("/ik_trial/start", args);
 export const trialSkip = () => bridge.call("/ik_trial/skip");
 export const trialStop = () => bridge.call("/ik_trial/stop");
-/** Gains for the present arm. */
-export const suggestGains = () => bridge.call("/study/gains", {}, LONG_CALL_MS);
-/** Offline motion of the same arm. */
-export const rollout = (args) => bridge.call("/study/rollout", args, LONG_CALL_MS);
+
+// The study's answers
+
+/** Gains for an arm. @param {import("./question.js").Question} question */
+export const suggestGains = (question) => bridge.call("/study/gains", gainsArgs(question), LONG_CALL_MS);
+/** An offline motion. @param {import("./question.js").Question} question @param {import("./question.js").Run} run */
+export const rollout = (question, run) => bridge.call("/study/rollout", rolloutArgs(question, run), LONG_CALL_MS);
+/** Limits of a loop. @param {import("./question.js").Question} question */
+export const stability = (question) => bridge.call("/study/stability", stabilityArgs(question), LONG_CALL_MS);
 
 export async function step(steps) {
   const answer = await bridge.call("/arm_sim/step", { steps });
@@ -298,24 +320,22 @@ export function sendSetpoint(positions) {
   });
 }
 
-/** The study's answer about any loop. */
-export const stability = (args) => bridge.call("/study/stability", args, LONG_CALL_MS);
-
 /** Asks about the active loop with each method, the present one first. Computing takes time, so only the newest loop counts. */
 const askNow = latestOnly(async () => {
-  const loop = question(state);
-  if (!loop) return;
-  const asked = JSON.stringify(loop);
-  const present = state.integrator?.method;
-  for (const [method] of METHODS.toSorted(([one], [other]) => Number(other === present) - Number(one === present))) {
-    const { result, values } = await stability({ ...loop, integrator: method });
-    if (JSON.stringify(question(state)) !== asked) return;
-    keepAnswer(state, asked, method, result ? values : null);
+  const present = questionOf(state);
+  if (!present) return;
+  const isPresent = (method) => Number(method === present.integrator);
+  for (const [method] of METHODS.toSorted(([one], [other]) => isPresent(other) - isPresent(one))) {
+    const asked = { ...present, integrator: method };
+    const { result, values } = await stability(asked);
+    const now = questionOf(state);
+    if (!now || loopKey(now) !== loopKey(asked)) return;
+    keepAnswer(state, asked, result ? values : null);
     tell("limits");
   }
 }, STABILITY_MS);
 
 /** Asks, unless the answer is known. */
 function askStability() {
-  if (question(state) && bridge.open && !answerInForce(state)) askNow();
+  if (questionOf(state) && bridge.open && !answerInForce(state)) askNow();
 }

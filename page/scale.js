@@ -108,7 +108,10 @@ export class LogScale {
     this.marks = marks ?? this.powers(6, duration);
   }
 
-  /** From the power of ten below the smallest value to the one above the largest. @param {number[]} values @param {number} most @param {(value: number) => string} label */
+  /**
+   * From the power of ten below the smallest value to the one above the largest. @param {number[]} values @param {number} most
+   * @param {(value: number) => string} label
+   */
   static around(values, most, label) {
     const scale = new LogScale(10 ** Math.floor(Math.log10(Math.min(...values))), 10 ** Math.ceil(Math.log10(Math.max(...values) * 1.01)), []);
     scale.marks = scale.powers(most, label);

@@ -4,14 +4,16 @@
 
 import { exact } from "./format.js";
 
-/** @typedef {import("./policy.js").Gains} Gains */
-/** @typedef {import("./policy.js").Arm} Arm */
+/** @typedef {import("./question.js").Gains} Gains */
+/** @typedef {import("./question.js").Arm} Arm */
 /**
  * @typedef {object} Settings
  * @property {{method?: string, timestep?: number} | null} integrator
  * @property {Partial<Arm> | null} params
  * @property {Partial<Gains> | null} gains
  * @property {{period?: number, delay?: boolean} | null} period the control period, 0 for every step [s]
+ * @property {{viscous?: number[]} | null} friction of each joint [N m s/rad]
+ * @property {{effort?: number[] | null, anti_windup?: string, tracking_time?: number} | null} motors their limits [N m], null for none
  * @property {boolean | null} controller whether it is on
  * @property {number[] | null} setpoint
  * @property {{position?: number[], velocity?: number[]} | null} [start] the start of the arm [rad, rad/s]; only in links
@@ -29,6 +31,8 @@ export const DEFAULTS = {
     params: { gravity: 9.81, masses: [1, 1], lengths: [1, 1] },
     gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] },
     period: { period: 0, delay: false },
+    friction: { viscous: [0, 0] },
+    motors: { effort: null, anti_windup: "clamp", tracking_time: 0.2 },
     controller: false,
     setpoint: [0, 0],
   },
@@ -37,19 +41,23 @@ export const DEFAULTS = {
     params: { gravity: 9.81, masses: [1, 1, 1], lengths: [1, 1, 1] },
     gains: { kp: [2200, 180, 80], ki: [3500, 300, 185], kd: [160, 38, 4.8] },
     period: { period: 0, delay: false },
+    friction: { viscous: [0, 0, 0] },
+    motors: { effort: null, anti_windup: "clamp", tracking_time: 0.2 },
     controller: false,
     setpoint: [0, 0, 0],
   },
 };
 
 /** The present settings; null until all are known. @returns {Settings | null} */
-export function presentSettings(/** @type {any} */ { links, integrator, params, gains, period, enabled, setpoint, setpointKnown }) {
+export function presentSettings(/** @type {any} */ { links, integrator, params, gains, period, friction, motors, enabled, setpoint, setpointKnown }) {
   if (!integrator || !params || !gains || !period || enabled == null) return null;
   return {
     integrator,
     params,
     gains,
     period: { period: period.period, delay: period.delay },
+    friction: friction ?? null,
+    motors: motors ?? null,
     controller: enabled,
     setpoint: setpointKnown ? Array.from(setpoint.subarray(0, links)) : null,
   };
@@ -61,7 +69,7 @@ export function hasSettings(settings) {
 }
 
 /** @param {Settings} settings @param {number} links */
-export function toFragment({ integrator, params, gains, period, controller, setpoint }, links) {
+export function toFragment({ integrator, params, gains, period, friction, motors, controller, setpoint }, links) {
   const list = (/** @type {number[]} */ values) => values.map(exact).join(",");
   const parts = [
     ["links", links], ["method", integrator?.method], ["timestep", exact(integrator?.timestep ?? NaN)],
@@ -69,6 +77,11 @@ export function toFragment({ integrator, params, gains, period, controller, setp
     ["kp", list(gains?.kp ?? [])], ["ki", list(gains?.ki ?? [])], ["kd", list(gains?.kd ?? [])],
     ["period", exact(period?.period ?? NaN)], ["delay", period?.delay ? "on" : "off"], ["controller", controller ? "on" : "off"],
   ];
+  if (friction?.viscous) parts.push(["viscous", list(friction.viscous)]);
+  if (motors) {
+    parts.push(["effort_limit", motors.effort ? list(motors.effort) : "none"], ["anti_windup", motors.anti_windup]);
+    parts.push(["tracking_time", exact(motors.tracking_time ?? NaN)]);
+  }
   if (setpoint) parts.push(["setpoint", list(setpoint)]);
   return parts.map(([name, value]) => `${name}=${value}`).join("&");
 }
@@ -93,10 +106,23 @@ export function fromFragment(/** @type {string} */ hash) {
     params: pick(["gravity", "masses", "lengths"], (name) => (name === "gravity" ? single(name) : numbers(name))),
     gains: pick(["kp", "ki", "kd"], numbers),
     period: pick(["period", "delay"], (name) => (name === "period" ? single(name) : onOff(name))),
+    friction: pick(["viscous"], numbers),
+    motors: motorsIn(given, numbers, single),
     controller: onOff("controller") ?? null,
     setpoint: numbers("setpoint") ?? null,
     ...(given.has("position") || given.has("velocity") ? { start: pick(["position", "velocity"], numbers) } : {}),
   };
+}
+
+/** The limits of the motors in a link; null if it has none. @returns {Settings["motors"]} */
+function motorsIn(/** @type {URLSearchParams} */ given, /** @type {(name: string) => any} */ numbers, /** @type {(name: string) => any} */ single) {
+  const anti_windup = given.get("anti_windup");
+  const tracking_time = single("tracking_time");
+  const found = {
+    ...(given.has("effort_limit") ? { effort: given.get("effort_limit") === "none" ? null : numbers("effort_limit") } : {}),
+    ...(anti_windup === null ? {} : { anti_windup }), ...(tracking_time === undefined ? {} : { tracking_time }),
+  };
+  return Object.keys(found).length > 0 ? found : null;
 }
 
 function isSame(/** @type {Settings} */ one, /** @type {Settings | null} */ other) {

@@ -1,11 +1,12 @@
 // A student's own arm: a form, and a printable sheet with its limits, the reason, the benefit of a better method, and a link.
-// Invariant: the sheet asks the study about the form's arm. The live arm does not change.
+// Invariant: the sheet asks the study about the form's arm alone, from rest, whatever the live arm does. The live arm does not change.
 
 import { byId, el } from "./dom.js";
 import { busy, option, panel } from "./field.js";
 import { METHODS, significant } from "./format.js";
-import { cause, isFree, limitText, others } from "./policy.js";
-import { MOVE_TO } from "./ladder.js";
+import { errorText, moveOf, read } from "./ladder.js";
+import { cause, limitText, others } from "./policy.js";
+import { isFree } from "./question.js";
 import { rollout, stability } from "./runtime.js";
 import { DEFAULTS, toFragment } from "./settings.js";
 import { state } from "./store.js";
@@ -24,11 +25,15 @@ let fields = {};
 let gravity;
 let said;
 
-/** Puts the form into `place`, with the present arm's values. `whenMade` is called after a sheet has been made. @param {HTMLElement} place @param {() => void} whenMade */
+/**
+ * Puts the form into `place`, with the present arm's values. `whenMade` is called after a sheet has been made. @param
+ * {HTMLElement} place @param {() => void} whenMade
+ */
 export function showForm(place, whenMade) {
   const known = /** @type {any} */ ({ ...DEFAULTS[state.links].params, ...DEFAULTS[state.links].gains, ...state.params, ...state.gains });
   gravity = option({ label: "gravity", unit: "m/s²", value: known.gravity });
-  fields = Object.fromEntries(LISTS.map(([key, name]) => [key, known[key].map((/** @type {number} */ value, /** @type {number} */ i) => option({ label: `${name} ${i + 1}`, value }))]));
+  fields = Object.fromEntries(LISTS.map(([key, name]) => [key,
+    known[key].map((/** @type {number} */ value, /** @type {number} */ i) => option({ label: `${name} ${i + 1}`, value }))]));
   const form = el("div", { id: "own-form" });
   const go = () => busy(said.buttons[0], "Computing…", async () => { if (await make()) whenMade(); });
   said = panel(form, [...Object.values(fields).flat(), gravity], [["Make my sheet", go, { type: "submit", class: "primary" }]]);
@@ -42,15 +47,17 @@ async function make() {
   const setpoint = new Array(state.links).fill(0);
   /** @type {Record<string, any>} */
   const answers = {};
-  for (const [method] of METHODS) {
-    const answer = await stability({ params, gains, setpoint, integrator: method, control_period: 0 });
+  for (const [integrator] of METHODS) {
+    const question = { params, gains, setpoint, q: setpoint, qd: setpoint, control_period: 0, delay: false, integrator, timestep: AT };
+    const answer = await stability(question);
     if (!answer.result) {
       said.show(answer.status);
       byId("sheet").hidden = true;
       return false;
     }
-    const move = await rollout({ params, gains, q0: setpoint, setpoint: MOVE_TO[state.links], duration: MOVE, timestep: AT, control_period: 0, integrator: method, samples: SAMPLES, reference: true });
-    answers[method] = { ...answer.values, error: move.result ? move.values.error : null };
+    const move = await rollout(moveOf(question), { duration: MOVE, samples: SAMPLES, reference: true });
+    const error = move.result ? errorText({ ...read({ method: integrator, timestep: AT }, move.values, MOVE), sampling: null }) : move.status;
+    answers[integrator] = { ...answer.values, error };
   }
   said.show("");
   const link = new URL(location.href);
@@ -68,25 +75,28 @@ function sheet(params, gains, answers, link) {
   const row = (/** @type {string} */ name, /** @type {string} */ value) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, value));
   const period = answers.rk4.control_period_limit ?? Infinity;
   const free = isFree(gains);
-  const reason = free ? "all gains are 0, so no controller holds this arm." : period === Infinity ? "no limit of this arm was found." : cause(answers.rk4, period);
+  const reason = free ? "all gains are 0, so no controller holds this arm." : period === Infinity ? "no limit of this arm was found."
+    : cause(answers.rk4, period);
   return [
     el("h3", {}, "My arm and its two clocks"),
     el("table", {}, el("tbody", {},
       row("Masses", `${text(params.masses)} kg`), row("Lengths", `${text(params.lengths)} m`), row("Gravity", `${significant(params.gravity, 4)} m/s²`),
       row("Gains kp", `${text(gains.kp)} N m/rad`), row("Gains ki", `${text(gains.ki)} N m/(rad s)`), row("Gains kd", `${text(gains.kd)} N m s/rad`),
       row("Longest control period, stretched out", free ? "no controller" : period === 0 ? "none" : limitText(period)),
-      ...METHODS.map(([method, name]) => row(`Longest timestep, the controller at each step, ${name}`, limitText(least(answers[method])))),
+      ...METHODS.map(([method, name]) => row(`Longest timestep, ${free ? "small swings" : "the controller at each step, stretched out"}, ${name}`,
+        limitText(held(answers[method])))),
       row("Longest timestep in every pose, Runge–Kutta 4", limitText(answers.rk4.minimum_over_poses_held ?? Infinity)),
-      ...METHODS.map(([method, name]) => row(`Largest error of the method in a move of ${MOVE} s at ${1e3 * AT} ms, ${name}`, answers[method].error === null ? "too small to measure, or diverged" : `${significant(answers[method].error, 2)} rad`)),
+      ...METHODS.map(([method, name]) => row(`Largest error of the method [rad] in a ${free ? "swing" : "move"} of ${MOVE} s at ${1e3 * AT} ms, `
+        + `${name}`, answers[method].error)),
     )),
     el("p", {}, `Reason: ${reason}`),
-    ...(free || period === 0 ? [] : [el("p", {}, others(Object.fromEntries(METHODS.map(([method]) => [method, least(answers[method])]))))]),
+    ...(free || period === 0 ? [] : [el("p", {}, others(Object.fromEntries(METHODS.map(([method]) => [method, held(answers[method])]))))]),
     el("p", { class: "sheet-link" }, "This arm as a link: ", el("a", { href: link }, link)),
     el("div", { class: "buttons no-print" }, el("button", { type: "button", onclick: () => print() }, "Print")),
   ];
 }
 
-/** The smaller limit of pose and motion [s]. @param {any} answer */
-function least(answer) {
-  return Math.min(answer.timestep_limit_held ?? Infinity, answer.timestep_limit_motion ?? Infinity);
+/** The limit of small motions [s]. A limit of fast motions is an estimate of another kind. @param {any} answer */
+function held(answer) {
+  return answer.timestep_limit_held ?? Infinity;
 }

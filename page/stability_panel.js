@@ -1,6 +1,6 @@
 // The limits of the timestep. Each method's button has its limit. The panel Stability has the reason, a map, and a small push of
-// the active loop, step by step. The map shows where the loop is stable, gains over timestep, with the present point as a dot.
-// A click or an arrow key moves the dot, and with it the settings.
+// the active loop, step by step. The map shows where the loop is stable, gains over the time for which a torque is held: the
+// timestep or, if it is longer, the control period. A dot is the present point. A click or an arrow key moves it, and with it the settings.
 // Invariant: all limits are the study's answers for the active loop, and an outdated one is never shown. The boundary is drawn
 // as far as it is known. A click sets the shown values. The bars are a run of the runtime at the present timestep.
 
@@ -10,8 +10,9 @@ import { shrinks } from "./course.js";
 import { byId, el, setText } from "./dom.js";
 import { duration, methodName, METHODS } from "./format.js";
 import { latestOnly } from "./latest.js";
-import { answerInForce, factorOf, isFree, limitInForce, limitText, question, scaled, stepsPerUpdate, whyText } from "./policy.js";
-import { setGains, setIntegrator } from "./runtime.js";
+import { answerInForce, factorOf, limitInForce, limitText, scaled, whyText } from "./policy.js";
+import { fromRest, isFree, questionOf, stepsPerUpdate } from "./question.js";
+import { setGains, setIntegrator, setPeriod } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { LOOP, state, watch } from "./store.js";
 import { climbRows, deviation, LOOKS } from "./study.js";
@@ -24,7 +25,8 @@ const WIDEST = 16;
 const FINE = 1.1; // one arrow key
 
 const factors = new LogScale(1 / WIDEST, WIDEST, [1 / 16, 1 / 4, 1, 4, 16].map((one) => [one, one < 1 ? `1/${1 / one}` : `${one}×`]));
-const timesteps = new LogScale(1e-4, 0.1);
+/** The held time [s]. */
+const times = new LogScale(1e-4, 0.1);
 
 let map;
 let chart;
@@ -38,34 +40,44 @@ export function startStability() {
   startLimits();
   const canvas = byId("map");
   map = new Surface(canvas, drawStability);
-  watch(["integrator", "gains", "params", "setpoint", "limits", "enabled", "tab", "links"], () => map.redraw());
+  watch(["integrator", "gains", "params", "period", "setpoint", "limits", "enabled", "tab", "links"], () => map.redraw());
   canvas.addEventListener("click", (event) => goTo(event.offsetX, event.offsetY));
   canvas.addEventListener("keydown", byArrows);
   bars = new Surface(byId("push-bars"), (surface) => drawBars(surface, heights, state.enabled ? "measurement of the controller" : "step"));
   watch([...LOOP, "tab", "view"], lookAtPush);
 }
 
-/** Settings that move the boundary; the timestep does not. */
-function mapSettings() {
-  const { integrator, gains, params, setpoint, links } = state;
-  if (!integrator || gains?.kp.length !== links || params?.masses.length !== links) return null;
-  const pose = (state.enabled && answerInForce(state)?.equilibrium) || Array.from(setpoint.subarray(0, links));
-  if (!(factorOf(gains, anchor) > 0)) anchor = gains;
-  return { method: integrator.method, gains: anchor, params, pose };
+/** Whether the control law runs less often than the steps. */
+function isSampled() {
+  return state.integrator && stepsPerUpdate(state) > 1;
+}
+
+/** The time for which a torque is held [s]. */
+function held() {
+  return state.integrator ? stepsPerUpdate(state) * state.integrator.timestep : NaN;
+}
+
+/** The question of the border, at the base gains: that of the loop once the controller is on. The timestep does not move the border. */
+function borderQuestion() {
+  const question = questionOf({ ...state, enabled: true });
+  if (!question) return null;
+  if (!(factorOf(question.gains, anchor) > 0)) anchor = question.gains;
+  return { ...question, gains: anchor, control_period: 0, timestep: 0.001, q: question.setpoint, qd: question.qd.map(() => 0) };
 }
 
 /** Asks the study for the border. A new request ends the old one. */
 async function askBorder() {
-  const present = mapSettings();
-  if (!present) return;
-  const key = JSON.stringify(present);
+  const question = borderQuestion();
+  if (!question) return;
+  const sampled = isSampled();
+  const key = JSON.stringify([question, sampled]);
   if (key === mapAsked) return;
   mapAsked = key;
   rows = [];
-  const { params, method: integrator, pose: setpoint } = present;
-  const ask = (factor) => ({ params, integrator, setpoint, gains: scaled(present.gains, factor) });
+  const ask = (factor) => ({ ...question, gains: scaled(question.gains, factor) });
   await climbRows(factors, ROWS, ask, () => mapAsked === key, (factor, values) => {
-    rows.push({ factor, limit: values.timestep_limit_held ?? Infinity, continuous: values.timestep_limit_continuous ?? Infinity });
+    rows.push(sampled ? { factor, limit: values.control_period_limit ?? Infinity }
+      : { factor, limit: values.timestep_limit_held ?? Infinity, continuous: values.timestep_limit_continuous ?? Infinity });
     map.redraw();
   });
   if (mapAsked === key && rows.length < ROWS) mapAsked = ""; // asked again at the next message
@@ -73,19 +85,22 @@ async function askBorder() {
 
 function drawStability() {
   askBorder();
-  chart = new Chart(map, timesteps, factors, { right: 10, top: 8, bottom: 36 });
-  chart.frame({ across: "timestep", grid: false });
+  chart = new Chart(map, times, factors, { right: 10, top: 8, bottom: 36 });
+  chart.frame({ across: isSampled() ? "control period" : "timestep", grid: false });
   const factor = factorOf(state.gains, anchor);
-  if (state.integrator && state.gains) drawMap(chart, rows, state.integrator.timestep, factor > 0 ? factor : 1);
+  if (state.integrator && state.gains) drawMap(chart, rows, held(), factor > 0 ? factor : 1);
   describeMap();
 }
 
 function describeMap() {
   const row = rows[Math.round(factors.place(factorOf(state.gains, anchor)) * (ROWS - 1))];
   if (!row || !state.integrator) return;
-  setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
-  setText(byId("map-text"), `Solid line: limit of ${methodName(state.integrator.method)}, ${limitText(row.limit)} with these gains. Dashed line: limit of a controller without a hold, ${limitText(row.continuous)}. `
-    + `The map is for a controller that acts at every step. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to set gains and timestep.`);
+  setText(byId("map-value"), `at ${duration(held())}`);
+  const lines = isSampled() ? `Line: limit of the control period, ${limitText(row.limit)} with these gains.`
+    : `Solid line: limit of ${methodName(state.integrator.method)}, ${limitText(row.limit)} with these gains, for a controller that acts at every step. `
+      + `Dashed line: limit of a controller without a hold, ${limitText(row.continuous)}.`;
+  const clock = isSampled() ? "control period" : "timestep";
+  setText(byId("map-text"), `${lines} The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to set gains and ${clock}.`);
 }
 
 function goTo(left, top) {
@@ -93,16 +108,17 @@ function goTo(left, top) {
   const place = (left - chart.left) / (chart.right - chart.left);
   const rise = (chart.bottom - top) / (chart.bottom - chart.top);
   if (place < 0 || place > 1 || rise < 0 || rise > 1) return;
-  moveTo(timesteps.value(place), factors.value(rise));
+  moveTo(times.value(place), factors.value(rise));
 }
 
 /** A diverged arm restarts there, because otherwise the new settings would show no effect. */
-async function moveTo(timestep, factor) {
+async function moveTo(time, factor) {
   const short = (value) => Number(value.toPrecision(3));
   const gains = scaled(anchor, factor);
   const changes = [];
-  if (Math.abs(Math.log(factor / factorOf(state.gains, anchor))) > 0.02) changes.push(setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) }));
-  if (timestep !== state.integrator.timestep) changes.push(setIntegrator({ timestep: short(timestep) }));
+  const isNewGain = Math.abs(Math.log(factor / factorOf(state.gains, anchor))) > 0.02;
+  if (isNewGain) changes.push(setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) }));
+  if (time !== held()) changes.push(isSampled() ? setPeriod({ period: short(time) }) : setIntegrator({ timestep: short(time) }));
   await Promise.all(changes);
   if (state.diverged) beginAnew();
 }
@@ -111,7 +127,7 @@ function byArrows(event) {
   const step = { ArrowLeft: [1 / FINE, 1], ArrowRight: [FINE, 1], ArrowUp: [1, FINE], ArrowDown: [1, 1 / FINE] }[event.key];
   if (!step || !state.integrator || !state.gains || !anchor) return;
   event.preventDefault();
-  moveTo(timesteps.moved(state.integrator.timestep, step[0]), factors.moved(factorOf(state.gains, anchor), step[1]));
+  moveTo(times.moved(held(), step[0]), factors.moved(factorOf(state.gains, anchor), step[1]));
 }
 
 const ASK_MS = 60;
@@ -121,24 +137,25 @@ let heights = /** @type {number[]} */ ([]);
 let pushAsked = "";
 
 function lookAtPush() {
-  const loop = question(state);
-  if (!loop || state.tab !== "stability" || state.view !== "workbench") return;
-  const key = JSON.stringify([loop, state.integrator]);
+  const present = questionOf(state);
+  if (!present || state.tab !== "stability" || state.view !== "workbench") return;
+  const loop = fromRest(present, answerInForce(state)?.equilibrium ?? present.setpoint);
+  const key = JSON.stringify(loop);
   if (key === pushAsked) return;
   pushAsked = key;
-  push({ loop, key });
+  push({ loop, key, steps: state.enabled ? stepsPerUpdate(state) : 1 });
 }
 
-const push = latestOnly(async ({ loop, key }) => {
-  const { method: integrator, timestep } = state.integrator;
-  const rest = answerInForce(state)?.equilibrium ?? loop.setpoint ?? new Array(state.links).fill(0);
-  const steps = state.enabled ? stepsPerUpdate(state) : 1;
-  const found = await deviation({ setpoint: rest, ...loop, integrator, timestep }, rest, steps * timestep);
+const push = latestOnly(async ({ loop, key, steps }) => {
+  const every = steps * loop.timestep;
+  const found = await deviation(loop, loop.q, every);
   if (key !== pushAsked || !found) return;
   heights = found;
-  const outcome = isFree(loop.gains) ? "nothing damps the push"
+  const isOff = isFree(loop.gains);
+  const outcome = isOff ? "nothing damps the push"
     : `the push ${shrinks(heights) ? "shrinks" : "does not shrink"} over ${LOOKS} ${steps > 1 ? "measurements" : "steps"}`;
-  setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${steps > 1 ? "a control period of " : ""}${duration(steps * timestep)}: ${outcome}.`);
+  setText(byId("push-text"), `${isOff ? "The free arm" : "The controller’s loop"} at `
+    + `${steps > 1 ? "a control period of " : ""}${duration(every)}: ${outcome}.`);
   bars.redraw();
 }, ASK_MS);
 
@@ -165,5 +182,5 @@ function showLimits() {
   const why = whyText(state);
   setText(byId("why-text"), why);
   // It stays visible while limits are computed again, so that a click still works.
-  if (METHODS.every(([method]) => answerInForce(state, method)) || !question(state)) byId("why").hidden = why === "";
+  if (METHODS.every(([method]) => answerInForce(state, method)) || !questionOf(state)) byId("why").hidden = why === "";
 }

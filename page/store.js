@@ -9,7 +9,8 @@ export function nothingAsked() {
 }
 
 export const state = {
-  connection: "connecting", // or "open", "lost"
+  connection: "connecting", // or "open", "lost"; "silent" without a message for some seconds
+  failures: 0, // attempts in a row without a connection
   links: 0, // 0 until the runtime has sent it
   // The latest joint state. Written in place 60 times a second; `version` counts them.
   version: 0,
@@ -23,11 +24,14 @@ export const state = {
   params: null, // { gravity, masses, lengths }
   integrator: null, // { method, timestep }
   gains: null, // { kp, ki, kd }
+  friction: null, // { viscous }: friction of each joint [N m s/rad]
+  motors: null, // { effort, anti_windup, tracking_time }: limits of the efforts [N m] or null, and the anti-windup [s]
   period: null, // { period, effective_period, delay }: the control period [s]
   paused: null,
   enabled: null, // whether the controller is on
   diagnostics: null, // { level, message, state, ...numbers }
   diverged: false,
+  broken: null, // the question at the divergence, if the page has seen it
   // The answers of /study/stability for the active loop. They have the requested loop (see `policy.js`), the values for
   // each method, and the first limit and speed of the motion since the last reset [s, rad/s].
   limits: nothingAsked(),
@@ -43,7 +47,7 @@ const watchers = new Map(); // key -> functions
 const everything = []; // functions
 
 /** The keys on which the verdict on the active loop depends. */
-export const LOOP = ["connection", "links", "integrator", "gains", "params", "period", "enabled", "setpoint", "diagnostics", "limits"];
+export const LOOP = ["connection", "links", "integrator", "gains", "params", "friction", "motors", "period", "enabled", "setpoint", "diagnostics", "limits"];
 
 /** @param {string | string[]} keys @param {(value: any) => void} react */
 export function watch(keys, react) {

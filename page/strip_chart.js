@@ -12,7 +12,8 @@ import { colors } from "./theme.js";
 
 /** @type {Series[]} */
 export const ENERGIES = [
-  { column: KINETIC, color: "kinetic", name: "kinetic" }, { column: POTENTIAL, color: "potential", name: "potential" }, { column: ENERGY, color: "ink", name: "total" },
+  { column: KINETIC, color: "kinetic", name: "kinetic" }, { column: POTENTIAL, color: "potential", name: "potential" },
+    { column: ENERGY, color: "ink", name: "total" },
 ];
 
 /** The smallest and the largest number in columns of the rows from `first` to before `last`. @param {number[]} columns @returns {[number, number]} */
@@ -66,7 +67,8 @@ export class StripChart {
     chart.inside(() => {
       if (Number.isFinite(level)) chart.path([[this.from, level], [now, level]], colors.muted, { width: 1, dash: DASHED });
       for (const { column, color, dashed } of lines) {
-        chart.line(last - first, (i) => data[record.at(first + i) + TIME], (i) => data[record.at(first + i) + column], color, dashed ? { width: 1.25, dash: DASHED, alpha: 0.85 } : {});
+        chart.line(last - first, (i) => data[record.at(first + i) + TIME], (i) => data[record.at(first + i) + column], color, dashed
+          ? { width: 1.25, dash: DASHED, alpha: 0.85 } : {});
       }
       chart.upright(leftAt, colors.bad);
       chart.upright(cursor, colors.accent);

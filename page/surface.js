@@ -7,9 +7,6 @@
 
 import { colors, onTheme } from "./theme.js";
 
-/** Paper has another width than the window, and no frames come while a page is printed. */
-const paper = matchMedia("print");
-
 export class Surface {
   /**
    * @param {HTMLCanvasElement} canvas @param {(surface: Surface) => void} paint paints everything on
@@ -58,14 +55,17 @@ export class Surface {
     const width = Math.round(right * density) - Math.round(left * density);
     const height = Math.round(bottom * density) - Math.round(top * density);
     if (width === this.width * this.density && height === this.height * this.density && density === this.density) return;
+    const isFirst = this.density === 0;
     this.density = density;
     this.width = width / density;
     this.height = height / density;
     this.canvas.width = Math.max(1, width);
     this.canvas.height = Math.max(1, height);
     this.context.setTransform(density, 0, 0, density, 0, 0);
+    this.clear();
     this.onResize();
-    if (paper.matches) draw(performance.now());
+    // A new size empties the canvas, so it is painted before the browser shows it.
+    if (!isFirst) draw(performance.now());
   }
 
   /** Fills it with the background's colour. */

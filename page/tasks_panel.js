@@ -109,7 +109,8 @@ function showTrial(trial) {
   byId("trial-progress").value = trial.duration > 0 ? Math.min(1, trial.elapsed / trial.duration) : 0;
   setText(byId("trial-error"), trial.error == null ? "" : `${fixed(trial.error, 3)} m to go`);
   const waits = trial.running && trial.action_status === "preempted";
-  setText(byId("trial-note"), waits ? "Another target replaced this one. Press Skip to continue." : trial.running && state.enabled === false ? "The controller is off, so the arm does not move to the targets." : "");
+  setText(byId("trial-note"), waits ? "Another target replaced this one. Press Skip to continue." : trial.running && state.enabled === false
+    ? "The controller is off, so the arm does not move to the targets." : "");
   if (wasRunning && !trial.running) announce(`Trial over: ${count}.`);
   wasRunning = trial.running;
 }

@@ -4,7 +4,8 @@
 import { byId, keepChoice, remembered } from "./dom.js";
 
 const KEY = "pendularm-theme";
-const NAMES = ["page", "panel", "ink", "muted", "line", "grid", "accent", "good", "warn", "bad", "target", "joint1", "joint2", "joint3", "kinetic", "potential", "stable", "unstable", "method1", "method2", "method3", "method4"];
+const NAMES = ["page", "panel", "ink", "muted", "line", "grid", "accent", "good", "warn", "bad", "target", "joint1", "joint2", "joint3", "kinetic",
+  "potential", "stable", "unstable", "method1", "method2", "method3", "method4"];
 const dark = matchMedia("(prefers-color-scheme: dark)");
 /** Paper is always light, and the user may choose the colours of all elements except the canvases. */
 const others = [matchMedia("print"), matchMedia("(forced-colors: active)")];

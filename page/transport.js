@@ -7,6 +7,7 @@ import { announce, byId, el, passFocus, setText, warn } from "./dom.js";
 import { refusal } from "./field.js";
 import { duration, fixed } from "./format.js";
 import { limitInForce, SLOW, verdict } from "./policy.js";
+import { connectionText, MANY } from "./readouts.js";
 import { pause, setPeriod, step } from "./runtime.js";
 import { LOOP, state, watch } from "./store.js";
 
@@ -58,30 +59,33 @@ function showNotice() {
   box.hidden = !notice;
   byId("stage").classList.toggle("diverged", notice?.key === "diverged");
   if (notice?.kind === "bad" && notice.key !== "diverged" && notice.key !== "lost") warn(notice.text); // those two are announced already
-  if (notice) box.replaceChildren(el("p", {}, notice.text), ...notice.buttons.map(([text, act]) => el("button", { type: "button", class: "small", onclick: act }, text)));
+  if (notice) box.replaceChildren(el("p", {}, notice.text),
+    ...notice.buttons.map(([text, act]) => el("button", { type: "button", class: "small", onclick: act }, text)));
 }
 
 function choose() {
   const { diagnostics, goal } = state;
   const { kind, sentence, advised, slow } = verdict(state);
   if (kind === "offline") {
-    return state.links === 0
-      ? { key: "connecting", kind: "calm", text: "Connecting to the arm…", buttons: [] }
-      : { key: "lost", kind: "bad", text: "Connection lost. Trying again…", buttons: [] };
+    const { connection, failures, links } = state;
+    const key = connection === "silent" ? connection : links > 0 ? "lost" : "connecting";
+    return { key, kind: links > 0 || failures >= MANY ? "bad" : "calm", text: connectionText(), buttons: [] };
   }
   const smaller = slow ? [["Control at every step", () => said.report(setPeriod({ period: 0 }))]]
     : advised > 0 ? [[`Restart at ${duration(advised)}`, () => said.report(recover(advised))]] : [];
   // No timestep helps if the gains are the cause.
   const other = state.enabled && limitInForce(state).everyPose === 0 ? [["Suggest gains", takeSuggestion]] : [];
   if (kind === "diverged") {
-    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Restart", () => said.report(beginAnew())]] };
+    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`,
+      buttons: [...smaller, ...other, ["Restart", () => said.report(beginAnew())]] };
   }
   if (kind === "beyond" || (kind === "never" && state.enabled)) return { key: "limit", kind: "bad", text: sentence, buttons: [...smaller, ...other] };
   if (diagnostics?.level === 1 && !state.paused && diagnostics.real_time_factor < SLOW) {
     return { key: "slow", kind: "warn", text: `The runtime can't keep up: ${diagnostics.real_time_factor.toFixed(2)} of real time.`, buttons: [] };
   }
   if (state.enabled === false && (goal?.outcome === "active" || state.trial?.running)) {
-    return { key: "controller", kind: "calm", text: "The controller is off, so the arm swings freely and does not follow.", buttons: [["Turn the controller on", () => switchController(true)]] };
+    return { key: "controller", kind: "calm", text: "The controller is off, so the arm swings freely and does not follow.",
+      buttons: [["Turn the controller on", () => switchController(true)]] };
   }
   if (state.paused && goal?.outcome === "active") {
     return { key: "paused", kind: "calm", text: "Paused: the arm does not move.", buttons: [["Run", togglePause]] };

@@ -5,14 +5,14 @@
 
 import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
-import { chooseLinks, followLink, linksInLink, needed, stepInLink } from "./course_view.js";
-import { announce, byId, el, passFocus, setAddress, setText } from "./dom.js";
+import { chooseLinks, followLink, linksInLink, needed, stepInLink, ticksInLink } from "./course_view.js";
+import { announce, byId, el, goToAddress, passFocus, setAddress, setText } from "./dom.js";
 import { isAlone, linksIn } from "./kernel.js";
 import { fromFragment, hasSettings, presentSettings, toFragment } from "./settings.js";
 import { set, state, watch } from "./store.js";
 
 /** A link with settings but without a step opens the workbench. */
-const SETTINGS = /(^#|&)(links|method|timestep|gravity|masses|lengths|kp|ki|kd|period|delay|controller|setpoint|workbench)\b/;
+const SETTINGS = /(^#|&)(links|method|timestep|gravity|masses|lengths|kp|ki|kd|period|delay|viscous|effort_limit|controller|setpoint|workbench)\b/;
 
 export function startViews() {
   byId("view-switch").addEventListener("click", () => show(state.view === "course" ? "workbench" : "course"));
@@ -30,7 +30,7 @@ export function startViews() {
   set("view", viewInLink() || "course");
   // Another link in the address bar of this page, or a click on the sheet's link.
   addEventListener("hashchange", () => {
-    const view = viewInLink();
+    const view = viewInLink() || (location.hash === "" ? "course" : ""); // without a fragment it is the first address
     if (!view) return; // as after the link to the arm
     const links = linksIn(location.hash);
     // Settings wait for a click, and bring their arm then.
@@ -58,7 +58,7 @@ function startLinks() {
 /** @param {"course" | "workbench"} view */
 function show(view) {
   const links = linksInLink();
-  if (view === "workbench" && stepIn(location.hash) >= 0) setAddress(location.pathname + location.search + (links && `#${links}`));
+  if (view === "workbench" && stepIn(location.hash) >= 0) goToAddress(`#${links || "workbench"}`);
   set("view", view);
 }
 
@@ -98,7 +98,7 @@ export function startShare() {
 export function address() {
   const link = new URL(location.href);
   link.search = ""; // it may hold a token
-  link.hash = stepInLink() + toFragment(/** @type {any} */ (presentSettings(state)), state.links);
+  link.hash = stepInLink() + ticksInLink() + toFragment(/** @type {any} */ (presentSettings(state)), state.links);
   return link.href;
 }
 
@@ -126,7 +126,7 @@ function offer() {
   banner.hidden = !hasSettings(settings);
   if (banner.hidden) return;
   const given = new URLSearchParams(location.hash.slice(1));
-  const text = [...given].filter(([name]) => name !== "links" && name !== "step").map(([name, value]) => `${name} ${value}`).join(" · ").slice(0, 300);
+  const text = [...given].filter(([name]) => !["links", "step", "done"].includes(name)).map(([name, value]) => `${name} ${value}`).join(" · ").slice(0, 300);
   const done = () => {
     passFocus(banner);
     banner.hidden = true;

@@ -17,10 +17,13 @@ mkdir dist
 
 case $system in
 linux-*)
-    export PORTABLE=1
+    export PORTABLE=1 PAGE=pendularm.html
     program=$(bash scripts/static.sh)
     cp pendularm.html dist/
-    cp submission.tar.gz "dist/pendularm-$version-sources.tar.gz"
+    # In one folder of its own, as an archive of sources is expected to be.
+    mkdir "$work/pendularm-$version"
+    tar -xzf submission.tar.gz -C "$work/pendularm-$version"
+    tar -czf "dist/pendularm-$version-sources.tar.gz" -C "$work" "pendularm-$version"
     python3 scripts/notices.py --sbom "dist/pendularm-$version.cdx.json"
     ;;
 *)
@@ -34,8 +37,8 @@ bash scripts/wheel.sh "$program"
 cp python/target/wheels/*.whl dist/
 
 bash scripts/install.sh "$program" "$work/$name"
-cp LICENSE-MIT LICENSE-APACHE ./*.md packaging/pendularm.service python/NOTICE-THIRD-PARTY.txt "$work/$name"
-# The targets of the links in README.md.
+cp LICENSE-MIT LICENSE-APACHE CHANGELOG.md SECURITY.md packaging/README.md packaging/pendularm.service python/NOTICE-THIRD-PARTY.txt "$work/$name"
+# What README.md links to.
 cp -R docs course "$work/$name"
 mkdir "$work/$name/python"
 cp -R python/examples "$work/$name/python"

@@ -19,10 +19,11 @@ PAPER = ROOT / "docs" / "development.md"
 MARKS = re.compile(r"(<!-- scripts/features.py -->\n).*?(<!-- end -->)", re.DOTALL)
 BUILDS = (
     ("default", None, "program"),
-    ("without the report", "web,record,cli", "program"),
-    ("without the record", "web,report,cli", "program"),
-    ("without the web and the record", "report,cli", "program"),
-    ("without the commands", "web,report,record", "program"),
+    ("without the report", "web,record,cli,conformance", "program"),
+    ("without the record", "web,report,cli,conformance", "program"),
+    ("without the web and the record", "report,cli,conformance", "program"),
+    ("without the commands", "web,report,record,conformance", "program"),
+    ("without conformance", "web,report,record,cli", "program"),
     ("`runtime` alone", "runtime", "program"),
     ("no features: the library", "", "library"),
 )

@@ -2,8 +2,9 @@
 """Lists the third-party packages in the program and in the wheel: notices with the licences' texts, or a bill of
 materials.
 
-notices.py --notices FILE, or --sbom FILE (CycloneDX 1.5). The source is Cargo, for this platform, without packages
-that are only for builds or tests.
+notices.py --notices FILE, or --sbom FILE (CycloneDX 1.5), or --page FILE: notices of the page's module alone, each
+under the licence MIT where it has that. The source is Cargo, for this platform, without packages that are only for
+builds or tests.
 """
 
 import argparse
@@ -17,6 +18,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 MANIFESTS = [ROOT / "Cargo.toml", ROOT / "python/Cargo.toml"]
 LICENCES = ["LICEN[CS]E*", "COPYING*", "NOTICE*", "UNLICENSE*", "*/COPYING"]
+PAGE = ROOT / "wasm/Cargo.toml"
 BESIDE = """The program contains the standard library of Rust (MIT OR Apache-2.0, https://github.com/rust-lang/rust), and where it is
 static the C library musl (MIT, https://musl.libc.org)."""
 
@@ -60,6 +62,30 @@ def notices(product: dict, packages: list[dict]) -> str:
     return "\n\n".join([head, "\n".join(lines), *texts]) + "\n"
 
 
+def page_notices() -> str:
+    """The packages in the page's module, and each text of a licence once, under the copyrights of its packages."""
+    tree = ["cargo", "tree", "--locked", "--manifest-path", str(PAGE), "--edges", "normal,no-proc-macro", "--prefix", "none"]
+    lines = output(*tree, "--target", "wasm32-unknown-unknown", "--format", "{p}").splitlines()
+    names = {tuple(line.split()[:2]) for line in lines}
+    asked = ["cargo", "metadata", "--locked", "--format-version", "1", "--manifest-path", str(PAGE)]
+    metadata = json.loads(output(*asked, "--filter-platform", "wasm32-unknown-unknown"))
+    packages = [one for one in metadata["packages"] if one["source"] and (one["name"], f"v{one['version']}") in names]
+    owners = {}
+    for package in sorted(packages, key=lambda one: one["name"]):
+        folder = Path(package["manifest_path"]).parent
+        files = sorted(folder.glob("LICENSE-MIT*")) or sorted({file for one in LICENCES for file in folder.glob(one) if file.is_file()})
+        assert files, f"{package['name']} has no text of its licence"
+        for file in files:
+            head, start, body = file.read_text(encoding="utf-8").partition("Permission is hereby granted")
+            copyrights = "; ".join(line.strip() for line in head.splitlines() if line.strip().startswith("Copyright"))
+            name = f"{package['name']} {package['version']}, {package['license']}{copyrights and ': ' + copyrights}"
+            text = " ".join((start + body if start else head).split())
+            owners.setdefault(text, []).append(name)
+    head = "pendularm (MIT OR Apache-2.0), copyright of its authors. This file contains the standard library of Rust (MIT OR\n"
+    head += "Apache-2.0, https://github.com/rust-lang/rust) and these packages."
+    return "\n\n".join([head, *("\n".join([*names, "", text]) for text, names in owners.items())]) + "\n"
+
+
 def component(package: dict, checksums: dict[tuple[str, str], str]) -> dict:
     name, version = package["name"], package["version"]
     return {
@@ -78,7 +104,11 @@ def main() -> None:
     wanted = parser.add_mutually_exclusive_group(required=True)
     wanted.add_argument("--notices", type=Path)
     wanted.add_argument("--sbom", type=Path)
+    wanted.add_argument("--page", type=Path)
     options = parser.parse_args()
+    if options.page:
+        options.page.write_text(page_notices(), encoding="utf-8")
+        return
     product, packages, checksums = {}, {}, {}
     for manifest in MANIFESTS:
         own, others = shipped(manifest)

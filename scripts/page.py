@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the page one file that needs no server: `scripts/page.py MODULE.wasm OUTPUT.html`.
+"""Makes the page one file that needs no server: `scripts/page.py MODULE.wasm NOTICES.txt OUTPUT.html`.
 
 The files of `page/` become one script: each module is a function, in the order of imports, and `pendularm` has their
 exports. The script and the WebAssembly module are stored as gzip in base64.
@@ -14,7 +14,7 @@ import re
 import sys
 
 PAGE = pathlib.Path(__file__).parent.parent / "page"
-MOST_BYTES = 600_000
+MOST_BYTES = 640_000
 IMPORT = re.compile(r'^import \{([^}]*)\} from "\./([^"]+)";\n', re.M)
 EXPORT = re.compile(r"^export ((?:async )?(?:function|class|const) )(\w+)", re.M)
 POLICY = ("default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; "
@@ -57,11 +57,15 @@ def replaced(text, old, new):
     return text.replace(old, new)
 
 
-def main(module, output):
+def main(module, notices, output):
     script = '"use strict";\nconst pendularm = globalThis.pendularm = {};\n' + modules("main.js", set())
     icon = "data:image/svg+xml;base64," + base64.b64encode((PAGE / "icon.svg").read_bytes()).decode()
     text = (PAGE / "index.html").read_text()
     text = replaced(text, '<meta charset="utf-8">', f'<meta charset="utf-8">\n  <meta http-equiv="Content-Security-Policy" content="{POLICY}">')
+    licences = pathlib.Path(notices).read_text()
+    if "-->" in licences:
+        raise SystemExit(f"page.py: {notices} has the end of a comment")
+    text = replaced(text, "</html>", f"</html>\n<!--\n{licences}-->")
     text = replaced(text, '"icon.svg"', f'"{icon}"')
     text = replaced(text, '<link rel="stylesheet" href="style.css">', f"<style>\n{(PAGE / 'style.css').read_text()}</style>")
     text = replaced(text, '  <script type="module" src="main.js"></script>\n', "")

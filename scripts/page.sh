@@ -30,4 +30,5 @@ else
     echo "page: needs the standard library for $target: rustup target add $target, or Debian's rustc-web, rust-web-src and lld" >&2
     exit 1
 fi
-python3 scripts/page.py "$folder/$target/page/pendularm_wasm.wasm" "${1:-pendularm.html}"
+python3 scripts/notices.py --page "$folder/notices.txt"
+python3 scripts/page.py "$folder/$target/page/pendularm_wasm.wasm" "$folder/notices.txt" "${1:-pendularm.html}"

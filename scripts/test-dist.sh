@@ -28,6 +28,7 @@ grep -q '^glam ' "$work"/pendularm-*/NOTICE-THIRD-PARTY.txt || fail "no notices"
 for link in $(grep -o '](\([^):#]*\)[)#]' "$work"/pendularm-*/README.md | tr -d '()#]'); do
     [ -e "$(echo "$work"/pendularm-*)/$link" ] || fail "README.md links to $link, which the archive lacks"
 done
+[ "$(tar -tzf dist/pendularm-*-sources.tar.gz | cut -d/ -f1 | sort -u | wc -l)" = 1 ] || fail "the sources are not in one folder"
 alone=(chroot "$work/empty")
 "${alone[@]}" /pendularm --version 2>/dev/null || alone=(unshare -r chroot "$work/empty")
 try_program '{"op":"call_service","service":"/ik/solve","args":{"x":1.2,"y":0.5}}' '*"result":true*' \
@@ -56,5 +57,6 @@ environment/bin/pendularm --version
 
 say "the page, from disk"
 cd "$root"
+grep -q '^glam ' dist/pendularm.html || fail "the page has no notices"
 FORM=file PAGE=dist/pendularm.html PYTHONDONTWRITEBYTECODE=1 python3 tests/browser/run.py -k sandboxed_frame -k mark_comes_after_the_guess
 say "ok"

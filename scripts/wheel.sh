@@ -2,6 +2,8 @@
 # Builds the Python wheel: wheel.sh PROGRAM. It contains the release program and the library. maturin comes from
 # PyPI into python/.venv. The wheel is the only file in python/target/wheels/.
 #
+# It also contains the page in one file, where that can be built; PAGE=pendularm.html names one that is already built.
+#
 # On Linux with PORTABLE=1 the wheel is for every system with a C library of 2012 or later (glibc 2.17). The program
 # is the static one. Zig links the library, because it has the symbols of each release. This needs another release
 # build.
@@ -42,6 +44,11 @@ mv target/wheel-data/data/bin target/wheel-data/scripts
 # maturin takes licences from the folder of pyproject.toml.
 cp ../LICENSE-MIT ../LICENSE-APACHE .
 "$python" ../scripts/notices.py --notices NOTICE-THIRD-PARTY.txt
+if [ -n "${PAGE:-}" ]; then
+    cp "../$PAGE" package/pendularm/pendularm.html
+else
+    bash ../scripts/page.sh python/package/pendularm/pendularm.html || say "without the page, which could not be built here"
+fi
 
 # On Linux the wheel's name has the required C library, but maturin checks only its own build.
 compatibility=()

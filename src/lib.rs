@@ -15,7 +15,8 @@
 //! | `batch` | yes | `math::simulation::batch`: many arms in the lanes of the processor's registers |
 //! | `report` | yes | `report`, with its experiments |
 //! | `record` | yes | `record`: records of runs, written, read and replayed |
-//! | `cli` | yes | `command`: commands for a running pendularm, completions |
+//! | `cli` | yes | `command`: commands for a running pendularm, completions; `score` |
+//! | `conformance` | yes | `referee`: the rules of the specification against any server |
 //!
 //! Without default features the library is [`math`] and [`study`], which is enough to step arms. Its dependencies
 //! are then `glam`, `libm` and `thiserror`. With `batch`, and `fearless_simd`, a free step of Runge-Kutta 4 on x86-64
@@ -56,8 +57,12 @@ pub mod plan;
 pub mod protocol;
 #[cfg(feature = "record")]
 pub mod record;
+#[cfg(feature = "conformance")]
+pub mod referee;
 #[cfg(feature = "report")]
 pub mod report;
+#[cfg(feature = "cli")]
+pub mod score;
 #[cfg(feature = "services")]
 pub mod services;
 #[cfg(feature = "runtime")]

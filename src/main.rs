@@ -4,13 +4,17 @@
 //! broken.
 
 use std::ffi::OsString;
-#[cfg(feature = "record")]
+#[cfg(any(feature = "record", feature = "cli"))]
 use std::fs::File;
 #[cfg(feature = "record")]
 use std::io::BufReader;
 use std::io::ErrorKind;
+#[cfg(feature = "cli")]
+use std::io::Read;
 #[cfg(feature = "record")]
 use std::path::Path;
+#[cfg(feature = "cli")]
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Arg, Args, Command};
@@ -25,8 +29,12 @@ use pendularm::output::{self, print_error};
 use pendularm::plan;
 #[cfg(feature = "record")]
 use pendularm::record;
+#[cfg(feature = "conformance")]
+use pendularm::referee;
 #[cfg(feature = "report")]
 use pendularm::report;
+#[cfg(feature = "cli")]
+use pendularm::score::MOST_BYTES;
 
 /// Exit status for every other failure.
 const FAILED: u8 = 1;
@@ -57,7 +65,11 @@ fn main() -> ExitCode {
         #[cfg(feature = "record")]
         Ok(Parsed::Replay { file }) => replay(&file),
         #[cfg(feature = "cli")]
+        Ok(Parsed::Score { files }) => score(&files),
+        #[cfg(feature = "cli")]
         Ok(Parsed::Ask(subject)) => end(command::run(&subject)),
+        #[cfg(feature = "conformance")]
+        Ok(Parsed::Conformance(options)) => ExitCode::from(referee::run(&options)),
         #[cfg(feature = "cli")]
         Ok(Parsed::Completions { shell }) => show(&completions(shell)),
         Ok(Parsed::Show(text)) => show(&text),
@@ -92,6 +104,25 @@ fn end(outcome: Result<(), CommandError>) -> ExitCode {
         print_error(&error);
     }
     ExitCode::from(status)
+}
+
+/// Prints the score and the verdict of each submission.
+#[cfg(feature = "cli")]
+fn score(files: &[PathBuf]) -> ExitCode {
+    let mut status = ExitCode::SUCCESS;
+    for path in files {
+        let mut text = Vec::new();
+        let read = File::open(path).and_then(|file| file.take(MOST_BYTES).read_to_end(&mut text));
+        let found = read.map_err(|error| error.to_string());
+        let file = output::line(&path.display());
+        match found.and_then(|_| pendularm::score::score(&text)) {
+            Ok(score) if show(&format!("{file}: {score}\n")) == ExitCode::SUCCESS => continue,
+            Ok(_) => return ExitCode::FAILURE,
+            Err(why) => print_error(&format_args!("{file}: {why}")),
+        }
+        status = ExitCode::FAILURE;
+    }
+    status
 }
 
 /// Replays a record and prints the result.

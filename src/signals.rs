@@ -172,6 +172,29 @@ impl Signals {
     }
 }
 
+/// Calls `ask` once this process is asked to end. A second request ends it at once.
+///
+/// # Errors
+/// If the operating system refuses a thread or a signal handler.
+#[cfg(feature = "conformance")]
+pub(crate) fn at_request(ask: impl Fn() + Send + 'static) -> io::Result<()> {
+    let runtime = runtime()?;
+    let mut requests = {
+        let _entered = runtime.enter();
+        EndRequests::listen()?
+    };
+    let wait = move || {
+        runtime.block_on(requests.next());
+        ask();
+        runtime.block_on(requests.next());
+        std::process::exit(1);
+    };
+    thread::Builder::new()
+        .name("signals".into())
+        .spawn(wait)
+        .map(drop)
+}
+
 #[cfg(unix)]
 #[cfg(test)]
 mod tests {

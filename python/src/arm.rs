@@ -9,6 +9,7 @@ use pyo3::types::{PyDict, PyTuple};
 
 use crate::arrays::{joints_or, property};
 use crate::fields::{self, Argument, Bound, Held, LosslessArgument, Object, Real, Whole, refused};
+use crate::floats::Promised;
 
 /// A value for 2 links or for 3: an arm, a simulation or another type.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,6 +100,7 @@ impl Arm {
     /// Distance from the base to the end effector of the stretched arm [m].
     #[getter]
     fn reach(&self) -> f64 {
+        let _floats = Promised::begin();
         for_either!(&self.chain, arm => arm.reach())
     }
 
@@ -130,6 +132,7 @@ fn read<const N: usize>(
     masses: Option<&Object<'_>>,
     gravity: f64,
 ) -> PyResult<Rods<N>> {
+    let _floats = Promised::begin();
     let lengths = joints_or("lengths", lengths, Bound::Positive, [1.0; N])?;
     let masses = joints_or("masses", masses, Bound::Positive, [1.0; N])?;
     Rods::new(lengths, masses, gravity).map_err(refused)

@@ -13,7 +13,8 @@ use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
 use crate::fields::{
-    Bound, Held, MOST_LISTED, Object, Real, beyond, held, is_masked, is_too_long, refused, shown,
+    Bound, Held, MOST_LISTED, Object, Real, beyond, has_booleans, held, is_masked, is_too_long,
+    refused, shown,
 };
 
 /// An empty vector with capacity for `count` entries.
@@ -102,7 +103,8 @@ impl<'py> ArrayArgument<'py> {
         self.array.shape()
     }
 
-    /// The numbers as one row of `width` per arm, or one row for all arms. Without `arms` only one row is valid.
+    /// The numbers as one row of `width` per arm, or one row for all arms, (`width`,) or (1, `width`). Without `arms`
+    /// only one row is valid.
     pub(crate) fn rows(
         &self,
         arms: Option<usize>,
@@ -111,14 +113,15 @@ impl<'py> ArrayArgument<'py> {
     ) -> PyResult<Rows<'_>> {
         let field = &self.field;
         let shape = self.shape();
-        if shape != [width] && arms.is_none_or(|arms| shape != [arms, width]) {
+        let is_one = shape == [width] || shape == [1, width];
+        if !is_one && arms.is_none_or(|arms| shape != [arms, width]) {
             let arms = arms.map_or_else(|| "n".to_owned(), |arms| arms.to_string());
             return Err(refused(format_args!(
                 "{field} must have the shape ({width},) or ({arms}, {width}), got {}",
                 in_python(shape)
             )));
         }
-        self.checked(width, shape.len() == 1, bound)
+        self.checked(width, is_one, bound)
     }
 
     /// The numbers as one per arm, or one for all arms.
@@ -142,11 +145,7 @@ impl<'py> ArrayArgument<'py> {
             [_] => format!("[{at}]"),
             _ => format!("[{}][{}]", at / width, at % width),
         })?;
-        Ok(Rows {
-            values,
-            width,
-            is_one,
-        })
+        Ok(Rows { values, is_one })
     }
 }
 
@@ -178,10 +177,13 @@ fn is_writeable(array: &Object<'_>) -> PyResult<bool> {
     flags.getattr(intern!(py, "writeable"))?.is_truthy()
 }
 
-/// Converts everything that NumPy can convert to doubles, except complex numbers, text and `None`.
+/// Converts everything that NumPy can convert to doubles, except booleans, complex numbers, text and `None`.
 #[pyfunction]
 pub(crate) fn as_doubles<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     let py = value.py();
+    if has_booleans(value)? {
+        return Err(refused(shown(value)));
+    }
     let numpy = py.import("numpy")?;
     let array = numpy.call_method1("asarray", (value,))?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
@@ -234,19 +236,10 @@ pub(crate) fn joints_or<const N: usize>(
 #[derive(Debug)]
 pub(crate) struct Rows<'a> {
     values: &'a [f64],
-    width: usize,
     is_one: bool,
 }
 
 impl Rows<'_> {
-    /// The same, where a single row is combined with every row of the others.
-    pub(crate) fn of_one_for_all(self) -> Self {
-        Self {
-            is_one: self.values.len() == self.width,
-            ..self
-        }
-    }
-
     /// The row of an arm. `N` is the requested width.
     pub(crate) fn row<const N: usize>(&self, arm: usize) -> [f64; N] {
         let start = if self.is_one { 0 } else { arm * N };

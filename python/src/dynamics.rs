@@ -10,6 +10,7 @@ use pyo3::prelude::{PyResult, Python, pyfunction};
 use crate::arm::{Given, for_either};
 use crate::arrays::{ArrayArgument, Rows, joints_or, room};
 use crate::fields::{self, Bound, Held, Object, Real, refused};
+use crate::floats::Promised;
 
 /// The shape of a function's result for one state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,6 +51,7 @@ fn all_rows<'py, const K: usize>(
     answer: Shape,
     function: impl FnOnce(&[Rows<'_>; K], usize, &mut Vec<f64>) + Send,
 ) -> PyResult<Object<'py>> {
+    let _floats = Promised::begin();
     let mut given = Vec::with_capacity(K);
     for (field, value) in fields {
         given.push((field, ArrayArgument::read(field, value)?));
@@ -70,7 +72,7 @@ fn all_rows<'py, const K: usize>(
             [1, _] => Some(1),
             _ => count,
         };
-        rows.push(numbers.rows(each, links, Bound::Finite)?.of_one_for_all());
+        rows.push(numbers.rows(each, links, Bound::Finite)?);
     }
     let rows: [Rows<'_>; K] = rows
         .try_into()
@@ -201,6 +203,7 @@ pub(crate) fn inverse_kinematics<'py>(
     phi: Option<Real>,
     present: Option<Object<'py>>,
 ) -> PyResult<Held<'py, numpy::PyArray1<f64>>> {
+    let _floats = Promised::begin();
     let (x, y) = (
         fields::number("x", x, Bound::Finite)?,
         fields::number("y", y, Bound::Finite)?,

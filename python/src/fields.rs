@@ -37,7 +37,8 @@ impl Bound {
         }
     }
 
-    fn admits(self, value: f64) -> bool {
+    /// Whether the number is valid.
+    pub(crate) fn admits(self, value: f64) -> bool {
         value.is_finite()
             && match self {
                 Self::Finite => true,
@@ -82,6 +83,49 @@ pub(crate) fn beyond(field: &str) -> PyErr {
 #[pyfunction]
 pub(crate) fn is_masked(value: &Object<'_>) -> PyResult<bool> {
     is_masked_within(value, MOST_DIMENSIONS)
+}
+
+/// Whether this is a boolean, or some entries of a list or an array are. NumPy reads them as 0 and 1.
+pub(crate) fn has_booleans(value: &Object<'_>) -> PyResult<bool> {
+    has_booleans_within(value, MOST_DIMENSIONS)
+}
+
+fn has_booleans_within(value: &Object<'_>, depth: usize) -> PyResult<bool> {
+    if value.is_instance_of::<PyFloat>() || value.is_exact_instance_of::<PyInt>() {
+        return Ok(false);
+    }
+    if value.is_instance_of::<PyBool>() {
+        return Ok(true);
+    }
+    let is_listed = value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>();
+    if !is_listed {
+        let Some(kind) = value.getattr_opt(intern!(value.py(), "dtype"))? else {
+            return Ok(false);
+        };
+        let kind = kind.getattr_opt(intern!(value.py(), "kind"))?;
+        let kind = kind.and_then(|kind| kind.extract::<String>().ok());
+        match kind.as_deref() {
+            Some("b") => return Ok(true),
+            Some("O") => {}
+            _ => return Ok(false),
+        }
+        if !value.is_instance_of::<PyUntypedArray>() {
+            return Ok(false);
+        }
+    }
+    if depth > 0 {
+        let parts = if is_listed {
+            value.clone()
+        } else {
+            value.getattr("flat")?
+        };
+        for one in parts.try_iter()? {
+            if has_booleans_within(&one?, depth - 1)? {
+                return Ok(true);
+            }
+        }
+    }
+    Ok(false)
 }
 
 fn is_masked_within(value: &Object<'_>, depth: usize) -> PyResult<bool> {
@@ -240,7 +284,8 @@ impl LosslessArgument for f64 {
         "must be a number".to_owned()
     }
 
-    /// NumPy's complex numbers would lose their imaginary parts, and masked ones their masks.
+    /// Booleans would count as 0 and 1. NumPy's complex numbers would lose their imaginary parts, and masked ones
+    /// their masks.
     fn is_lossless(value: Borrowed<'_, '_, PyAny>) -> bool {
         let is_real = || {
             // NumPy would allocate all of a range before it finds that it is not a number.
@@ -249,7 +294,7 @@ impl LosslessArgument for f64 {
             }
             let numpy = value.py().import("numpy")?;
             let is_complex = numpy.call_method1("iscomplexobj", (value,))?;
-            PyResult::Ok(!is_complex.is_truthy()? && !is_masked(&value)?)
+            PyResult::Ok(!is_complex.is_truthy()? && !is_masked(&value)? && !has_booleans(&value)?)
         };
         value.is_instance_of::<PyFloat>() || is_real().unwrap_or(false)
     }

@@ -33,7 +33,8 @@ pub(crate) fn listed<'py, const N: usize>(
     Ok(found)
 }
 
-/// Gains by name, `{"kp": …, "ki": …, "kd": …}`. A missing one comes from `missing`.
+/// Gains by name, `{"kp": …, "ki": …, "kd": …}`, or an object with these attributes, such as suggested gains. A
+/// missing one comes from `missing`.
 pub(crate) fn read<const N: usize>(
     value: Option<&Object<'_>>,
     missing: Gains<N>,
@@ -41,17 +42,24 @@ pub(crate) fn read<const N: usize>(
     let Some(value) = value else {
         return Ok(missing);
     };
-    let gains = value
-        .cast::<PyMapping>()
-        .ok()
-        .and_then(|mapping| PyDict::type_object(value.py()).call1((mapping,)).ok())
-        .and_then(|gains| gains.cast_into::<PyDict>().ok())
-        .ok_or_else(|| {
-            refused(format_args!(
-                "gains must be a mapping with kp, ki and kd, got {}",
-                shown(value)
-            ))
-        })?;
+    let of_mapping = || {
+        let mapping = value.cast::<PyMapping>().ok()?;
+        let gains = PyDict::type_object(value.py()).call1((mapping,)).ok()?;
+        gains.cast_into::<PyDict>().ok()
+    };
+    let of_attributes = || {
+        let gains = PyDict::new(value.py());
+        for name in ["kp", "ki", "kd"] {
+            gains.set_item(name, value.getattr(name).ok()?).ok()?;
+        }
+        Some(gains)
+    };
+    let gains = of_mapping().or_else(of_attributes).ok_or_else(|| {
+        refused(format_args!(
+            "gains must be a mapping with kp, ki and kd, got {}",
+            shown(value)
+        ))
+    })?;
     for name in gains.keys() {
         let is_one = |name: String| ["kp", "ki", "kd"].contains(&name.as_str());
         if !name.extract().is_ok_and(is_one) {

@@ -3,7 +3,7 @@
 //! This layer is thin: it reads arguments, and the `pendularm` crate computes everything and steps every arm. Users
 //! import `package/pendularm/`, which wraps this module.
 //!
-//! **Invariant:** work of more than some milliseconds runs with the interpreter's lock released, and ends at a
+//! **Invariant:** every computation runs in the promised floating-point environment (`floats`). Work of more than some milliseconds runs with the interpreter's lock released, and ends at a
 //! signal.
 
 mod arm;
@@ -11,14 +11,20 @@ mod arrays;
 mod batch;
 mod dynamics;
 mod fields;
+mod floats;
 mod gains;
+mod held;
 mod patience;
 mod simulation;
+mod state;
 mod study;
 
 /// The compiled part of the package `pendularm`.
 #[pyo3::pymodule(name = "_native")]
 mod native {
+    /// Version and sources of this wheel.
+    #[pymodule_export]
+    const BUILD: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("PENDULARM_SOURCES"));
     #[pymodule_export]
     use crate::arm::Arm;
     #[pymodule_export]
@@ -33,7 +39,11 @@ mod native {
     #[pymodule_export]
     use crate::fields::{is_masked, is_too_long};
     #[pymodule_export]
+    use crate::floats::PromisedFloats;
+    #[pymodule_export]
     use crate::gains::default_gains;
+    #[pymodule_export]
+    use crate::held::held_limit;
     #[pymodule_export]
     use crate::simulation::{Divergence, Simulation};
     #[pymodule_export]

@@ -3,12 +3,15 @@
 //! **Invariant:** every computation notices a signal within a fraction of a second.
 
 use std::collections::VecDeque;
+use std::ops::{Deref, DerefMut};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::{PyResult, Python};
 use pyo3::sync::MutexExt;
+
+use crate::floats::Promised;
 
 /// The duration of a piece: short for a user who presses Ctrl-C, and long compared with the check for signals.
 const PIECE: Duration = Duration::from_millis(50);
@@ -23,6 +26,7 @@ pub(crate) fn until_done<T: Send>(
 ) -> PyResult<T> {
     loop {
         let piece = py.detach(|| {
+            let _floats = Promised::begin();
             let began = Instant::now();
             loop {
                 let answer = advance();
@@ -38,10 +42,35 @@ pub(crate) fn until_done<T: Send>(
     }
 }
 
+/// A locked value, in the promised floating-point environment.
+#[derive(Debug)]
+pub(crate) struct Holding<'a, T> {
+    value: MutexGuard<'a, T>,
+    _floats: Promised,
+}
+
+impl<T> Deref for Holding<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.value
+    }
+}
+
+impl<T> DerefMut for Holding<'_, T> {
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.value
+    }
+}
+
 /// Waits for a lock without holding the interpreter's. Its value is consistent, even after a panic of another thread.
-pub(crate) fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> MutexGuard<'a, T> {
-    one.lock_py_attached(py)
-        .unwrap_or_else(PoisonError::into_inner)
+pub(crate) fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> Holding<'a, T> {
+    Holding {
+        value: one
+            .lock_py_attached(py)
+            .unwrap_or_else(PoisonError::into_inner),
+        _floats: Promised::begin(),
+    }
 }
 
 /// A queue of threads that change a shared object: one at a time, in order.

@@ -13,13 +13,14 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::{ControlPeriod, Simulation as Loop};
 use pyo3::IntoPyObject;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyclass, pymethods};
-use pyo3::types::{PyDict, PyMappingProxy};
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::arm::{Arm, Chain, Either, Given, for_either, or_default};
 use crate::arrays::{joints, joints_or, property};
 use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
 use crate::gains;
 use crate::patience::{hold, until_done};
+use crate::state;
 
 /// Steps between two checks of the clock: some hundred microseconds.
 const STEPS_PER_LOOK: u64 = 1000;
@@ -65,8 +66,8 @@ impl Divergence {
 /// `midpoint`, `verlet` or `rk4`. `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,)
 /// each. A missing gain has the value of a fresh runtime. The controller runs once per `control_period` [s],
 /// rounded to a whole number of timesteps, at least 1. Its effort is held in between. With `control_delay` it is
-/// applied one period later. Threads may share a simulation. It cannot be copied or pickled. A process that is
-/// forked while another thread steps it must not use it.
+/// applied one period later. Threads may share a simulation. A copied or unpickled one takes the same steps, bit for
+/// bit. A process that is forked while another thread steps it must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Simulation {
@@ -189,7 +190,8 @@ impl Simulation {
     }
 
     /// Sets the state: `position` [rad] and `velocity` [rad/s] (zeros by default), (links,) each. A divergence ends.
-    /// Clock and controller do not change.
+    /// Clock and controller do not change. With the bytes of `get_state` in place of the position, everything is set:
+    /// arm, controller, method, clock, disturbance and divergence.
     #[pyo3(signature = (position, velocity=None))]
     fn set_state(
         &self,
@@ -197,6 +199,14 @@ impl Simulation {
         position: &Object<'_>,
         velocity: Option<&Object<'_>>,
     ) -> PyResult<()> {
+        if let Ok(state) = position.cast::<PyBytes>() {
+            for_either!(&self.own, one => {
+                if let Some(read) = state::read(state, 1, velocity)?.pop() {
+                    *hold(py, one) = read;
+                }
+            });
+            return Ok(());
+        }
         for_either!(&self.own, one => {
             let state = State {
                 position: joints("position", position, Bound::Finite)?,
@@ -205,6 +215,23 @@ impl Simulation {
             hold(py, one).set_state(state);
         });
         Ok(())
+    }
+
+    /// The whole state as bytes, for `set_state` of a simulation with as many links.
+    fn get_state<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyBytes>> {
+        for_either!(&self.own, one => state::written(py, std::slice::from_ref(&*hold(py, one))))
+    }
+
+    fn __getnewargs__(&self, py: Python<'_>) -> (Arm,) {
+        (self.arm(py),)
+    }
+
+    fn __getstate__<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyBytes>> {
+        self.get_state(py)
+    }
+
+    fn __setstate__(&self, py: Python<'_>, state: &Object<'_>) -> PyResult<()> {
+        self.set_state(py, state, None)
     }
 
     /// Adds `effort` [N m], (links,), to the controller's in every step that begins within `duration` [s] from now. It
@@ -279,9 +306,10 @@ impl Simulation {
         })
     }
 
-    /// The present gains by name, in a read-only mapping. `set_gains` changes them.
+    /// The present gains by name, in a read-only mapping, which can be copied, pickled and handed in. `set_gains`
+    /// changes them.
     #[getter]
-    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyMappingProxy>> {
+    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Object<'py>> {
         let found = PyDict::new(py);
         for_either!(&self.own, one => {
             let one = hold(py, one);
@@ -290,7 +318,8 @@ impl Simulation {
                 found.set_item(name, property(py, gain)?)?;
             }
         });
-        Ok(PyMappingProxy::new(py, found.as_mapping()))
+        py.import("pendularm._fields")?
+            .call_method1("Gains", (found,))
     }
 
     /// Whether the controller is on.

@@ -24,6 +24,7 @@ use pyo3::types::PyDict;
 use crate::arm::{Given, for_either, or_default};
 use crate::arrays::{joints_or, room};
 use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
+use crate::floats::Promised;
 use crate::gains;
 use crate::patience::until_done;
 
@@ -48,6 +49,7 @@ pub(crate) fn stability<'py>(
     py: Python<'py>,
     arguments: StabilityArguments<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
+    let _floats = Promised::begin();
     let method = arguments.integrator.method("integrator")?;
     let period = read_period(arguments.control_period)?;
     for_either!(or_default(arguments.arm)?, arm => {
@@ -144,6 +146,7 @@ pub(crate) fn rollout<'py>(
     py: Python<'py>,
     arguments: RolloutArguments<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
+    let _floats = Promised::begin();
     let duration = arguments.duration.read("duration")?;
     let timestep = arguments.timestep.read("timestep")?;
     let samples = arguments.samples.read("samples")?;
@@ -238,6 +241,7 @@ pub(crate) fn suggest_gains<'py>(
     py: Python<'py>,
     arguments: GainsArguments<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
+    let _floats = Promised::begin();
     let settling_time = arguments.settling_time;
     let requirements = GainsRequirements {
         settling_time: fields::number("settling_time", settling_time, Bound::Positive)?,
@@ -286,6 +290,7 @@ pub(crate) fn plan<'py>(
     py: Python<'py>,
     arguments: PlanArguments<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
+    let _floats = Promised::begin();
     let error = fields::number("error", arguments.error, Bound::Positive)?;
     let period = read_period(arguments.control_period)?;
     for_either!(or_default(arguments.arm)?, arm => {
@@ -314,7 +319,10 @@ fn read_loop<const N: usize>(
             fields::shown(setpoint)
         )));
     }
-    let gains = gains::read(gains, no_control())?;
+    let gains = gains.map_or_else(
+        || Ok(no_control()),
+        |given| gains::read(Some(given), Gains::default()),
+    )?;
     let setpoint = Setpoint::at(joints_or("setpoint", setpoint, Bound::Finite, [0.0; N])?);
     Ok(ControlLoop::new(arm, gains, setpoint))
 }

@@ -227,3 +227,21 @@ def test_a_mask_may_be_a_view_or_of_objects():
         assert (batch.position[:, 0] == 0).tolist() == chosen
     batch.reset((batch.position > 0)[:, 0])
     assert not batch.position.any()
+
+
+@pytest.mark.parametrize("shape", [(2,), (1, 2)])
+def test_one_row_applies_to_all_arms(shape):
+    batch, row = pendularm.Batch(3), np.array([0.3, -0.4]).reshape(shape)
+    batch.set_state(row, row)
+    batch.set_setpoint(row, row)
+    batch.set_gains(row + 5, row + 5, row + 5)
+    batch.set_params(masses=row + 1)
+    batch.step(5, row)
+    one = pendularm.Batch(1)
+    one.set_state(row, row)
+    one.set_params(masses=row + 1)
+    one.step(5, row)
+    assert batch.position.tolist() == one.position.tolist() * 3
+    arm = pendularm.Arm()
+    expected = pendularm.dynamics.coriolis(arm, batch.position, [0.3, -0.4])
+    assert np.array_equal(pendularm.dynamics.coriolis(arm, batch.position, row), expected)

@@ -1,5 +1,8 @@
 """The environments pass Gymnasium's checks, and the vector ones are equal to single ones."""
 
+import copy
+import pickle
+
 import gymnasium
 import numpy as np
 import pytest
@@ -47,6 +50,96 @@ def test_the_vector_environment_is_as_many_single_ones(name, links):
     assert ends >= 3 * arms
     ours.close()
     theirs.close()
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, "SameStep"])
+def test_an_arm_is_reset_in_the_step_of_its_end(name, links, mode):
+    arms = 5
+    ours = gymnasium.make_vec(name, arms, links=links, max_episode_steps=7, autoreset_mode=mode)
+    assert ours.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    one = lambda: gymnasium.make(name, links=links, max_episode_steps=7)
+    theirs = gymnasium.vector.SyncVectorEnv([one] * arms, autoreset_mode=AutoresetMode.SAME_STEP)
+    random = np.random.default_rng(5)
+    assert np.array_equal(ours.reset(seed=7)[0], theirs.reset(seed=7)[0])
+    ends = 0
+    for step in range(40):
+        if step == 10:
+            mask = np.array([True, False, False, True, False])
+            for env in (ours, theirs):
+                env.reset(options={"reset_mask": mask})
+        actions = random.uniform(-1.5, 1.5, (arms, links)).astype(np.float32)
+        found, expected = ours.step(actions), theirs.step(actions)
+        for part, other in zip(found[:4], expected[:4], strict=True):
+            assert np.array_equal(part, other), step
+            assert part.dtype == other.dtype
+        assert found[4].keys() == expected[4].keys()
+        for arm, last in enumerate(expected[4].get("final_obs", [])):
+            assert np.array_equal(found[4]["final_obs"][arm], last)
+            assert found[4]["_final_obs"][arm] == expected[4]["_final_obs"][arm] == (last is not None)
+            assert found[4]["_final_info"][arm] == expected[4]["_final_info"][arm]
+            assert found[4]["final_info"] == expected[4]["final_info"] == {}
+            ends += last is not None
+    assert ends >= 3 * arms
+
+
+def test_without_automatic_resets_the_caller_resets(name):
+    env = gymnasium.make_vec(name, 3, max_episode_steps=2, autoreset_mode=AutoresetMode.DISABLED)
+    env.reset(seed=1)
+    env.step(np.zeros((3, 2), np.float32))
+    env.reset(options={"reset_mask": np.array([False, True, False])})
+    last, *_, truncated, _ = env.step(np.zeros((3, 2), np.float32))
+    assert truncated.tolist() == [True, False, True]
+    with pytest.raises(gymnasium.error.ResetNeeded, match=r"^step needs a reset of the ended arms \[0, 2\] before it"):
+        env.step(np.zeros((3, 2), np.float32))
+    after = env.reset(options={"reset_mask": truncated})[0]
+    assert np.array_equal(after[1], last[1])
+    assert env.step(np.zeros((3, 2), np.float32))[3].tolist() == [False, True, False]
+    with pytest.raises(ValueError, match="^autoreset_mode must be one of NextStep, SameStep, Disabled, got 'never'"):
+        gymnasium.make_vec(name, 3, autoreset_mode="never")
+
+
+def by_state(env):
+    other = type(env)(*([3] if hasattr(env, "num_envs") else []), links=env._task.links)
+    other.set_state(env.get_state())
+    return other
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env)), by_state])
+@pytest.mark.parametrize("arms", [None, 3])
+def test_a_copied_environment_goes_on_with_the_same_bits(name, links, arms, again):
+    if arms is None:
+        env = gymnasium.make(name, links=links).unwrapped
+    else:
+        env = gymnasium.make_vec(name, arms, links=links, max_episode_steps=12)
+    random = np.random.default_rng(3)
+    env.reset(seed=5)
+    for _ in range(10):
+        env.step(random.uniform(-1, 1, env.action_space.shape).astype(np.float32))
+    other = again(env)
+    actions = random.uniform(-1, 1, (10, *env.action_space.shape)).astype(np.float32)
+    ours = [env.step(action) for action in actions]
+    ours.append(env.reset())
+    theirs = [other.step(action) for action in actions]
+    theirs.append(other.reset())
+    for one, two in zip(ours, theirs, strict=True):
+        assert [np.asarray(part).tolist() for part in one] == [np.asarray(part).tolist() for part in two]
+
+
+def test_a_wrapped_environment_is_copied_with_its_wrappers(name):
+    env = gymnasium.make(name)
+    env.reset(seed=5)
+    for _ in range(env.spec.max_episode_steps - 1):
+        env.step(np.zeros(2, np.float32))
+    assert copy.deepcopy(env).step(np.zeros(2, np.float32))[3]
+    assert pickle.loads(pickle.dumps(env)).step(np.zeros(2, np.float32))[3]
+
+
+def test_the_state_of_another_environment_is_refused():
+    env = pendularm.envs.PendularmVectorEnv(3)
+    env.reset(seed=1)
+    for other in [pendularm.envs.PendularmVectorEnv(2), pendularm.envs.PendularmVectorEnv(3, links=3), pendularm.envs.PendularmReachVectorEnv(3)]:
+        with pytest.raises(ValueError, match="^state must be of the same kind of environment, got a Pendularm"):
+            env.set_state(other.get_state())
 
 
 def test_the_action_of_an_arm_that_has_ended_is_ignored(name):
@@ -224,6 +317,25 @@ def test_actions_have_a_row_for_each_arm(actions):
     one.reset(seed=0)
     with pytest.raises(ValueError, match=r"action must have the shape \(2,\)"):
         one.step(actions)
+
+
+def test_booleans_are_not_actions():
+    env, one = pendularm.envs.PendularmVectorEnv(3), pendularm.envs.PendularmEnv()
+    env.reset(seed=0)
+    one.reset(seed=0)
+    with pytest.raises(ValueError, match=r"^actions must have the shape \(3, 2\), of numbers, got \(3, 2\) of bool"):
+        env.step(np.ones((3, 2), bool))
+    with pytest.raises(ValueError, match=r"^action must have the shape \(2,\), of numbers, got \(2,\) of bool"):
+        one.step(np.ones(2, bool))
+
+
+@pytest.mark.parametrize("kind", [pendularm.envs.PendularmEnv, pendularm.envs.PendularmReachVectorEnv])
+def test_a_refused_environment_can_be_closed(kind):
+    # Gymnasium 1.1 and 1.2 close it when it is collected.
+    env = kind.__new__(kind)
+    with pytest.raises(ValueError, match="^links must be 2 or 3, got 4"):
+        env.__init__(links=4)
+    env.close()
 
 
 @pytest.mark.parametrize("given", [[[1, 1], [1, 2, 3]], range(2**62)])

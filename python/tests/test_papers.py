@@ -1,5 +1,6 @@
 """The Python code in the documents runs unchanged."""
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -33,6 +34,19 @@ def test_each_part_of_the_manual_runs_by_itself(tmp_path):
     said = "".join(run(part, tmp_path) for part in blocks(MANUAL))
     assert "(20, 20, 2)" in said
     assert len(list((tmp_path / "gains").glob("*.npz"))) == 1
+
+
+def test_each_robot_has_its_limit(tmp_path):
+    page = (ROOT / "docs" / "your-robot.md").read_text(encoding="utf-8")
+    assert len(page.encode()) <= 10_000
+    one, isaac, mujoco, ros = blocks(page)
+    said = run(one, tmp_path)
+    assert "joint[0]: kd 0.5 N m s/rad needs an effective inertia of at least 0.001 kg m^2 at 0.004 s" in said
+    assert [line.split()[:2] for line in run(isaac, tmp_path).splitlines()] == [["0.0", "False"], ["0.001", "True"]]
+    assert [line.split()[:2] for line in run(ros, tmp_path).splitlines()] == [["0", "True"], ["1", "False"]]
+    if importlib.util.find_spec("mujoco"):
+        said = run(mujoco, tmp_path).splitlines()
+        assert [line.split()[:2] for line in said[:2]] == [["Euler", "False"], ["implicitfast", "True"]]
 
 
 def test_the_wheels_own_page_runs(tmp_path):

@@ -1,8 +1,10 @@
 """Sweeps: the same bits from any number of workers, stored on disk and continued, even after the loss of a worker."""
 
 import functools
+import itertools
 import json
 import os
+import pickle
 import subprocess
 import sys
 import threading
@@ -244,13 +246,72 @@ def test_a_folder_keeps_numbers_under_any_names(tmp_path):
         return {name: run.energy[-1] + place for place, name in enumerate(names)}
 
     ask = {"grid": {"kp": [1.0, 2.0]}, "metric": many, "q0": 0.5, "duration": 0.1, "folder": tmp_path}
-    expected = pendularm.sweep(**ask).values
+    expected = pendularm.sweep(**ask)
     with Counting(1) as executor:
-        found = pendularm.sweep(executor=executor, **ask).values
+        found = pendularm.sweep(executor=executor, **ask)
         assert executor.given == 0
     assert list(found) == list(expected) == names
     for name in names:
         assert np.array_equal(found[name], expected[name]), name
+
+
+def test_the_results_are_a_mapping():
+    found = pendularm.sweep(GRID, "final_error", **FIXED)
+    assert "final_error" in found
+    assert "settling_time" not in found
+    assert list(found) == list(found.keys()) == ["final_error"]
+    assert len(found) == 1
+    assert dict(found)["final_error"] is found["final_error"]
+    assert found.get("settling_time") is None
+    assert found == found
+    assert found != pendularm.sweep(GRID, "final_error", **FIXED)
+    again = pickle.loads(pickle.dumps(found))
+    assert np.array_equal(again["final_error"], found["final_error"])
+    assert again.grid.keys() == found.grid.keys()
+
+
+def test_a_sweep_names_every_encoding(tmp_path):
+    script = "import pendularm; pendularm.sweep({'kp': [1.0]}, 'final_error', duration=0.1, folder='sweep')"
+    for _ in range(2):
+        run = subprocess.run(
+            [sys.executable, "-X", "warn_default_encoding", "-W", "error", "-c", script],
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+        )
+        assert run.returncode == 0, run.stderr
+
+
+def become_old():
+    sys.modules["pendularm.sweep"].BUILD = "0.1.0"
+
+
+def as_older_versions(fn, *args):
+    """The results alone, as they were before workers named their wheel."""
+    return fn(*args)[1]
+
+
+class OldAmongNew:
+    """Two workers: one with this wheel, and one with an old one."""
+
+    def __init__(self, new, old, change=lambda fn: fn):
+        self.workers, self.change = itertools.cycle([(new, lambda fn: fn), (old, change)]), change
+
+    def submit(self, fn, /, *args):
+        worker, change = next(self.workers)
+        return worker.submit(change(fn), *args)
+
+
+def test_a_worker_with_another_wheel_is_refused(tmp_path):
+    ask = {"metric": "final_error", "piece": 6, "folder": tmp_path, **FIXED}
+    with ProcessPoolExecutor(1) as new, ProcessPoolExecutor(1, initializer=become_old) as old:
+        with pytest.raises(ValueError, match=r"^a worker has another wheel of pendularm \(0\.1\.0\) than this "):
+            pendularm.sweep(GRID, executor=OldAmongNew(new, old), **ask)
+        older = OldAmongNew(new, new, lambda fn: functools.partial(as_older_versions, fn))
+        with pytest.raises(ValueError, match=r"^a worker has another wheel of pendularm \(of an older version\) than "):
+            pendularm.sweep(GRID, executor=older, **ask)
+        found = pendularm.sweep(GRID, executor=new, **ask)
+    assert np.array_equal(found["final_error"], pendularm.sweep(GRID, "final_error", **FIXED)["final_error"])
 
 
 def test_a_folder_knows_the_code_of_a_metric(tmp_path):

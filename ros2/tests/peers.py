@@ -33,9 +33,18 @@ from programs import LIMIT, open_session, run, say, start_router, wait_for
 from zenoh_ros2_sdk.attachment import Attachment
 
 
+def list_with(port, kind, expected):
+    """The lines of the SDK's list, once it has all of these. Its session may ask before the router knows the graph."""
+
+    def get():
+        listed = command_line(port, kind, "list", "-t").splitlines()
+        return listed if expected <= set(listed) else None
+
+    return wait_for(f"the {kind}s {expected}", get)
+
+
 def test_topics_are_listed_with_their_types(port):
-    listed = command_line(port, "topic", "list", "-t").splitlines()
-    for line in [
+    topics = {
         "/joint_states [sensor_msgs/msg/JointState]",
         "/joint_trajectory [trajectory_msgs/msg/JointTrajectory]",
         "/clock [rosgraph_msgs/msg/Clock]",
@@ -45,21 +54,29 @@ def test_topics_are_listed_with_their_types(port):
         "/robot_description [std_msgs/msg/String]",
         "/rosout [rcl_interfaces/msg/Log]",
         "/ik_trial/status [pendularm_interfaces/msg/TrialStatus]",
-    ]:
-        assert line in listed, (line, listed)
-    services = command_line(port, "service", "list", "-t").splitlines()
-    for line in [
+    }
+    services = {
         "/arm_sim/set_integrator [pendularm_interfaces/srv/SetIntegrator]",
         "/arm_sim/get_parameters [rcl_interfaces/srv/GetParameters]",
         "/rosapi/topics [rosapi_msgs/srv/Topics]",
-    ]:
-        assert line in services, (line, services)
-    return f"{len(listed)} topics, {len(services)} services"
+    }
+    return f"{len(list_with(port, 'topic', topics))} topics, {len(list_with(port, 'service', services))} services"
+
+
+def whole_graph(session):
+    """The tokens of topics and services, once those of the last declared action are among them."""
+
+    def get():
+        found = [token for kind in ["MP", "MS", "SS"] for token in tokens(session, kind)]
+        parts = {token[10].rsplit("_", 2)[-2] for token in found if "::action::" in token[10]}
+        return found if {"SendGoal", "GetResult", "FeedbackMessage"} <= parts else None
+
+    return wait_for("the graph with actions", get)
 
 
 def test_hashes_of_standard_types_are_those_of_jazzy(session):
     checked = set()
-    for token in tokens(session, "MP") + tokens(session, "MS"):
+    for token in whole_graph(session):
         package, _, name = token[10].partition("::msg::dds_::")
         name = f"{package}/msg/{name.removesuffix('_')}"
         if name in JAZZY.types:
@@ -82,7 +99,7 @@ def test_hashes_are_those_that_ros_2_itself_has(session):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, timeout=LIMIT)
         known = json.loads(answer.read_text())
     found = {}
-    for token in tokens(session, "MP") + tokens(session, "MS") + tokens(session, "SS"):
+    for token in whole_graph(session):
         name = token[10].replace("::dds_::", "/").replace("::", "/").removesuffix("_")
         assert found.setdefault(name, token[11]) == token[11], token
     strange = {name.split("/")[0] for name in found.keys() - known.keys()}
@@ -247,8 +264,8 @@ def test_another_arm_has_its_namespace(address, port, session):
     left = start_bridge(address, port, "--namespace", "/left")
     left.said("is in domain")
     hears_joint_states(session, "/left")
-    found = {(token[7], token[9]) for token in tokens(session, "MP")}
-    assert {("%", "%joint_states"), ("%left", "%left%joint_states")} <= found, found
+    both = {("%", "%joint_states"), ("%left", "%left%joint_states")}
+    wait_for("both arms", lambda: both <= {(token[7], token[9]) for token in tokens(session, "MP")})
     left.end()
 
 

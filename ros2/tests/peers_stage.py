@@ -38,7 +38,7 @@ def start_bridge(arm, router_port, *more):
 
 def tokens(session, kind="*"):
     """The parts of the tokens of that kind in the domain: 8 is the node, 9 the name, 10 the type, 11 the hash."""
-    replies = session.liveliness().get(f"@ros2_lv/{DOMAIN}/*/*/*/{kind}/**")
+    replies = session.liveliness().get(f"@ros2_lv/{DOMAIN}/*/*/*/{kind}/**", timeout=LIMIT)
     return [str(reply.ok.key_expr).split("/") for reply in replies if reply.ok]
 
 

@@ -12,6 +12,7 @@ mod goals;
 mod journal;
 mod limit;
 mod limit_watch;
+mod loads;
 mod parameters;
 mod requests;
 mod scene;
@@ -26,6 +27,7 @@ use bytes::Bytes;
 use self::counts::Counts;
 use self::goals::Goals;
 use self::limit_watch::LimitWatch;
+use self::loads::Loads;
 use crate::math::arm::Arm;
 use crate::math::pacer::Pacer;
 use crate::math::pid::Gains;
@@ -86,6 +88,7 @@ pub struct LiveArm<const N: usize, W> {
     catching_up: bool,
     pub(crate) counts: Counts,
     pub(crate) goals: Goals<N>,
+    pub(crate) loads: Loads<N>,
     limit: LimitWatch<N>,
     /// The journal of the steps' inputs, if there is one.
     pub(crate) journal: Option<Journal<N>>,
@@ -105,6 +108,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             paused_at: 0.0,
             catching_up: false,
             goals: Goals::default(),
+            loads: Loads::default(),
             limit: LimitWatch::default(),
             journal: None,
         }

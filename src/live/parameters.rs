@@ -39,18 +39,23 @@ impl<const N: usize> ArmRequest<N> for AskParameters<N> {
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
     fn value_of(&self, parameter: Parameter) -> ParameterValue<N> {
-        use ParameterValue::{Number, PerJoint, Text};
+        use ParameterValue::{Number, PerJoint, Text, Unset};
         let (arm, gains) = (self.simulation.arm(), self.simulation.pid().gains());
+        let limits = self.simulation.limits();
         match parameter {
             Parameter::Gravity => Number(arm.gravity()),
             Parameter::Masses => PerJoint(*arm.masses()),
             Parameter::Lengths => PerJoint(*arm.lengths()),
+            Parameter::Viscous => PerJoint(*arm.viscous()),
             Parameter::Kp => PerJoint(gains.kp),
             Parameter::Ki => PerJoint(gains.ki),
             Parameter::Kd => PerJoint(gains.kd),
             Parameter::Integrator => Text(self.simulation.method().name().to_owned()),
             Parameter::Timestep => Number(self.simulation.timestep()),
             Parameter::ControlPeriod => Number(self.simulation.control_period().period),
+            Parameter::EffortLimit => limits.effort.map_or(Unset, PerJoint),
+            Parameter::AntiWindup => Text(limits.anti_windup.name().to_owned()),
+            Parameter::TrackingTime => Number(limits.tracking_time),
             Parameter::RobotDescription => {
                 let (lengths, masses) = (arm.lengths(), arm.masses());
                 Text(urdf::describe(&joint_names::<N>(), lengths, masses))
@@ -62,9 +67,11 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     fn set(&mut self, change: ParameterChange<N>) -> Rejections {
         match change {
             ParameterChange::Params(ask) => ask.perform(self).rejected,
+            ParameterChange::Friction(ask) => ask.perform(self).rejected,
             ParameterChange::Gains(ask) => ask.perform(self).rejected,
             ParameterChange::Integrator(ask) => ask.perform(self).rejected,
             ParameterChange::Period(ask) => ask.perform(self).rejected,
+            ParameterChange::Limits(ask) => ask.perform(self).rejected,
         }
     }
 }

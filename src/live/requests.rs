@@ -6,13 +6,14 @@
 use super::{LiveArm, World};
 use crate::math::arm::{Arm, State};
 use crate::math::kinematics::Unreachable;
+use crate::math::limits::Limits;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::{ArmInput, ControlPeriod};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::Rejections;
 use crate::services::arm::{
-    DIVERGED, Disturb, Enable, GetTime, Integrator, Pause, PeriodInForce, Push, Reset, SetGains,
-    SetIntegrator, SetParams, SetPeriod, SetState,
+    DIVERGED, Disturb, Enable, GetTime, Integrator, Pause, PeriodInForce, Push, Reset, SetFriction,
+    SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod, SetState,
 };
 use crate::services::goals::Solve;
 use crate::services::{Ask, Echo};
@@ -151,6 +152,38 @@ impl<const N: usize> ArmRequest<N> for SetPeriod {
                 period,
                 effective: period.effective(arm.simulation.timestep()),
             },
+            rejected: self.rejected,
+        }
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for SetFriction<N> {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<[f64; N]> {
+        let present = *arm.simulation.arm();
+        let mut rejected = self.rejected;
+        match self.viscous.map(|viscous| present.with_friction(viscous)) {
+            Some(Ok(changed)) if changed != present => {
+                arm.change(ArmInput::Arm(changed));
+                arm.restart_energy_drift();
+            }
+            Some(Err(why)) => rejected.refuse("viscous", &why),
+            _ => {}
+        }
+        let values = *arm.simulation.arm().viscous();
+        Echo { values, rejected }
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for SetLimits<N> {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<Limits<N>> {
+        let present = *arm.simulation.limits();
+        let values = self.applied_to(&present);
+        if values != present {
+            arm.change(ArmInput::Limits(values));
+            arm.loads.restart();
+        }
+        Echo {
+            values,
             rejected: self.rejected,
         }
     }

@@ -47,6 +47,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         if self.counts.ticks.is_multiple_of(u64::from(PUBLISH_RATE)) {
             self.publish_diagnostics();
             self.counts.end_window(self.world.now(), self.stands());
+            self.loads.end_window();
         }
     }
 
@@ -68,6 +69,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     /// Measures the drift from the present energy.
     pub(super) fn restart_energy_drift(&mut self) {
         self.counts.energy_reference = energy(&self.simulation);
+        self.loads.friction = 0.0;
     }
 
     /// Publishes the message of `make`, which is called when the frame is written.
@@ -117,17 +119,19 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             None => (level, "running", "running".to_owned()),
         };
         let energy = energy(&self.simulation);
-        let rates = self
-            .counts
-            .window
-            .rates(self.world.now())
-            .unwrap_or(self.counts.last_rates);
+        let rates = self.counts.window.rates(self.world.now());
+        let at_limit = self.loads.shares(rates.is_some());
+        let rates = rates.unwrap_or(self.counts.last_rates);
         let numbers = [
             ("sim_time", self.simulation.time()),
             ("real_time_factor", rates.real_time_factor),
             ("steps_per_second", rates.steps_per_second),
             ("energy", energy),
-            ("energy_drift", energy - self.counts.energy_reference),
+            (
+                "energy_drift",
+                energy + self.loads.friction - self.counts.energy_reference,
+            ),
+            ("friction_loss", self.loads.friction),
             ("max_step_time", self.counts.window.longest.step_time()),
             ("control_period", self.effective_period()),
             ("control_period_limit", self.period_limit()),
@@ -139,6 +143,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         values.extend(numbers.map(|(key, value)| entry(key, format!("{value:?}"))));
         let setpoint = self.simulation.pid().setpoint().position;
         values.push(entry("setpoint", format!("{setpoint:?}")));
+        values.push(entry("effort_at_limit", format!("{at_limit:?}")));
         values.push(entry("warning", warnings.join("; ")));
         DiagnosticStatus {
             level,

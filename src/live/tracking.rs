@@ -8,11 +8,12 @@
 use std::ops::ControlFlow;
 
 use super::goals::{GoalOrder, GoalProgress, Obstacle, Pose, Tracked, Tracking, pose};
+use super::loads::Loads;
 use super::{LiveArm, World};
 use crate::math::goal::{Cadence, Goal};
 use crate::math::kinematics::{Target, Unreachable, nearest_turn, solve};
 use crate::math::pid::Setpoint;
-use crate::math::simulation::ArmInput;
+use crate::math::simulation::{ArmInput, Simulation};
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
     /// The present state of the arm.
@@ -92,12 +93,26 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     pub(super) fn advance(&mut self, steps: u64, waits: bool) -> (u64, Option<GoalProgress<N>>) {
         let past = self.goals.past;
         let tracked = self.goals.tracked.as_mut();
+        let mut loads = Loads::are_watched(&self.simulation).then_some(&mut self.loads);
+        if let Some(loads) = &mut loads {
+            loads.begin(&self.simulation);
+        }
         let Some(tracked) = tracked.filter(|goal| goal.commanded) else {
-            return (self.simulation.advance(steps), None);
+            let Some(loads) = loads else {
+                return (self.simulation.advance(steps), None);
+            };
+            let count = |simulation: &Simulation<N>| {
+                loads.count(simulation);
+                ControlFlow::Continue(())
+            };
+            return (self.simulation.advance_with(steps, count), None);
         };
         let (mut progress, mut reached) = (None, None);
         let world = &self.world;
         let taken = self.simulation.advance_with(steps, |simulation| {
+            if let Some(loads) = &mut loads {
+                loads.count(simulation);
+            }
             (progress, reached) = tracked.judge(simulation, past);
             let news = if !waits || reached.is_some() {
                 progress.take()

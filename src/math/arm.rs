@@ -18,6 +18,8 @@ pub struct Arm<const N: usize> {
     masses: [f64; N],
     pub(super) gravity: f64,
     pub(super) rods: [Rod; N],
+    /// Viscous friction of each joint \[N m s/rad\].
+    pub(super) viscous: [f64; N],
 }
 
 /// The constants of one link that the dynamics need, for one arm or for several side by side.
@@ -58,6 +60,14 @@ pub enum ArmError {
         /// The value given.
         value: f64,
     },
+    /// A coefficient of friction is NaN, infinite or negative.
+    #[error("viscous[{index}] must be finite and at least 0, got {}", Shown(*.value))]
+    Friction {
+        /// Joint, from 0.
+        index: usize,
+        /// The value given \[N m s/rad\].
+        value: f64,
+    },
     /// Gravity is NaN or infinite.
     #[error("gravity must be finite, got {}", Shown(*.value))]
     GravityNotFinite {
@@ -92,7 +102,43 @@ impl<const N: usize> Arm<N> {
     /// The same arm without gravity.
     #[must_use]
     pub fn weightless(&self) -> Self {
-        Self::valid(self.lengths, self.masses, 0.0)
+        Self {
+            viscous: self.viscous,
+            ..Self::valid(self.lengths, self.masses, 0.0)
+        }
+    }
+
+    /// The same arm with viscous friction at its joints \[N m s/rad\]: the effort `-viscous velocity`. Stiction and
+    /// backlash are left out, because both switch within a step, so no method would have its order.
+    ///
+    /// # Errors
+    /// The first coefficient that is not finite and at least 0.
+    pub fn with_friction(self, viscous: [f64; N]) -> Result<Self, ArmError> {
+        let wrong = |value: &f64| !(value.is_finite() && *value >= 0.0);
+        match viscous.iter().position(wrong) {
+            Some(index) => Err(ArmError::Friction {
+                index,
+                value: viscous.get(index).copied().unwrap_or(f64::NAN),
+            }),
+            // `-0.0` is not negative, but would be shown as if it were.
+            None => Ok(Self {
+                viscous: viscous.map(f64::abs),
+                ..self
+            }),
+        }
+    }
+
+    /// Viscous friction of each joint \[N m s/rad\].
+    #[must_use]
+    pub const fn viscous(&self) -> &[f64; N] {
+        &self.viscous
+    }
+
+    /// Whether a joint has friction.
+    #[must_use]
+    #[inline]
+    pub fn has_friction(&self) -> bool {
+        self.viscous.iter().any(|&one| one > 0.0)
     }
 
     fn valid(lengths: [f64; N], masses: [f64; N], gravity: f64) -> Self {
@@ -121,6 +167,7 @@ impl<const N: usize> Arm<N> {
             masses,
             gravity: gravity.abs(),
             rods,
+            viscous: [0.0; N],
         }
     }
 

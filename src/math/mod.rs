@@ -12,6 +12,7 @@ pub mod expression;
 pub mod goal;
 pub mod integrator;
 pub mod kinematics;
+pub mod limits;
 pub mod number;
 pub mod pacer;
 pub mod particle;

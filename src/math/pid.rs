@@ -204,7 +204,8 @@ impl<const N: usize> Pid<N> {
         &self.setpoint
     }
 
-    /// Integral of the position error \[rad s\], each within [`INTEGRAL_LIMIT`].
+    /// Integral of the position error \[rad s\], each within [`INTEGRAL_LIMIT`], except with another anti-windup
+    /// than [`super::limits::AntiWindup::Clamp`].
     #[must_use]
     pub fn integral(&self) -> &[f64; N] {
         &self.integral

@@ -8,7 +8,7 @@
 use std::env;
 use std::ffi::OsString;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
-#[cfg(any(feature = "record", feature = "web"))]
+#[cfg(any(feature = "record", feature = "web", feature = "cli"))]
 use std::path::PathBuf;
 
 use clap::builder::Resettable;
@@ -25,6 +25,8 @@ use crate::logging::LogFormat;
 use crate::plan::PlanOptions;
 pub use crate::protocol::limits::{DEFAULT_CLIENTS, MAX_CLIENTS};
 use crate::protocol::op::token::Token;
+#[cfg(feature = "conformance")]
+use crate::referee::ConformanceOptions;
 #[cfg(feature = "report")]
 use crate::report::ReportOptions;
 pub use crate::value::Links;
@@ -143,6 +145,17 @@ pub enum Parsed {
         /// The record, from --record or /recorder/start
         file: PathBuf,
     },
+    /// Recompute episodes of the Python environments from their submissions, and print scores and verdicts
+    #[cfg(feature = "cli")]
+    #[command(after_help = "Exit status: 0 if every submission is confirmed, 1 if not.")]
+    Score {
+        /// The submissions, from pendularm.submission
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+    },
+    /// Test any server of the protocol against the rules of the specification
+    #[cfg(feature = "conformance")]
+    Conformance(Box<ConformanceOptions>),
     /// A command for a running pendularm.
     #[cfg(feature = "cli")]
     #[command(flatten)]

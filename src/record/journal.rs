@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::math::arm::{Arm, ArmError, State};
 use crate::math::integrator::Method;
+use crate::math::limits::{AntiWindup, Limits};
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::{ArmInput, Checkpoint, ControlPeriod, Held, StepNote};
 use crate::protocol::wire::text::{excerpt, shortened};
@@ -58,6 +59,7 @@ pub fn write_note<const N: usize>(note: &StepNote<N>) -> String {
             ArmInput::Setpoint(setpoint) => ("setpoint", setpoint.write()),
             ArmInput::Disturbance { effort, duration } => ("disturb", (*effort, *duration).write()),
             ArmInput::Period(period) => ("period", period.write()),
+            ArmInput::Limits(limits) => ("limits", limits.write()),
             ArmInput::State(state) => ("state", state.write()),
             ArmInput::Command(effort) => ("command", effort.write()),
             ArmInput::Drive(effort) => ("drive", effort.write()),
@@ -89,14 +91,14 @@ pub fn read_note<const N: usize>(note: &str) -> Result<StepNote<N>, NoteError> {
     Ok(StepNote::Input(match kind.as_str() {
         "begin" => {
             let simulation: Checkpoint<N> = Noted::read("begin", &value["simulation"])?;
-            require_positive(simulation.timestep)?;
+            require_positive("timestep", simulation.timestep)?;
             return Ok(StepNote::Begin(Box::new(simulation)));
         }
         "diverged" => return Ok(StepNote::Diverged),
         "method" => ArmInput::Method(Noted::read("method", value)?),
         "timestep" => {
             let timestep = Noted::read("timestep", value)?;
-            require_positive(timestep)?;
+            require_positive("timestep", timestep)?;
             ArmInput::Timestep(timestep)
         }
         "params" => ArmInput::Arm(Noted::read("params", value)?),
@@ -108,6 +110,7 @@ pub fn read_note<const N: usize>(note: &str) -> Result<StepNote<N>, NoteError> {
             ArmInput::Disturbance { effort, duration }
         }
         "period" => ArmInput::Period(Noted::read("period", value)?),
+        "limits" => ArmInput::Limits(Noted::read("limits", value)?),
         "state" => ArmInput::State(Noted::read("state", value)?),
         "command" => ArmInput::Command(Noted::read("command", value)?),
         "drive" => ArmInput::Drive(Noted::read("drive", value)?),
@@ -116,9 +119,9 @@ pub fn read_note<const N: usize>(note: &str) -> Result<StepNote<N>, NoteError> {
     }))
 }
 
-fn require_positive(timestep: f64) -> Result<(), NoteError> {
-    let is_positive = (timestep > 0.0).then_some(());
-    is_positive.ok_or(NoteError::Field("timestep", "be greater than 0"))
+fn require_positive(name: &'static str, time: f64) -> Result<(), NoteError> {
+    let is_positive = (time > 0.0).then_some(());
+    is_positive.ok_or(NoteError::Field(name, "be greater than 0"))
 }
 
 // ---- the values in them ---------------------------------------------------------------------------------------------
@@ -148,7 +151,7 @@ macro_rules! noted {
 
 noted! {
     [const N: usize] Checkpoint<N> {
-        arm, gains, setpoint, integral, enabled, held, method, timestep, state, carry, effort, disturbance, base,
+        arm, gains, setpoint, integral, enabled, held, limits, method, timestep, state, carry, effort, disturbance, base,
         steps_since_base, steps, divergence
     }
     [const N: usize] Held<N> { period, due, effort, computed, command, driven }
@@ -170,17 +173,52 @@ impl Noted for ControlPeriod {
     }
 }
 
+/// Records of versions without limits have none.
+impl<const N: usize> Noted for Limits<N> {
+    fn write(&self) -> Value {
+        let anti_windup = self.anti_windup.name();
+        let tracking_time = self.tracking_time;
+        json!({"effort": self.effort.write(), "anti_windup": anti_windup, "tracking_time": tracking_time})
+    }
+
+    fn read(_: &'static str, from: &Value) -> Result<Self, NoteError> {
+        if from.is_null() {
+            return Ok(Self::default());
+        }
+        let effort: Option<[f64; N]> = Noted::read("effort", &from["effort"])?;
+        if effort.iter().flatten().any(|limit| *limit < 0.0) {
+            return Err(NoteError::Field("effort", "not be negative"));
+        }
+        let mut forms = AntiWindup::ALL.into_iter();
+        let anti_windup = forms.find(|form| from["anti_windup"] == form.name());
+        let tracking_time = Noted::read("tracking_time", &from["tracking_time"])?;
+        require_positive("tracking_time", tracking_time)?;
+        Ok(Self {
+            effort,
+            anti_windup: anti_windup
+                .ok_or(NoteError::Field("anti_windup", "be the name of a form"))?,
+            tracking_time,
+        })
+    }
+}
+
 impl<const N: usize> Noted for Arm<N> {
     fn write(&self) -> Value {
         let (masses, lengths) = (self.masses().write(), self.lengths().write());
-        json!({"gravity": self.gravity(), "masses": masses, "lengths": lengths})
+        let mut written = json!({"gravity": self.gravity(), "masses": masses, "lengths": lengths});
+        if self.has_friction() {
+            written["viscous"] = self.viscous().write();
+        }
+        written
     }
 
     fn read(_: &'static str, from: &Value) -> Result<Self, NoteError> {
         let lengths = Noted::read("lengths", &from["lengths"])?;
         let masses = Noted::read("masses", &from["masses"])?;
         let gravity = Noted::read("gravity", &from["gravity"])?;
-        Ok(Self::new(lengths, masses, gravity)?)
+        let viscous: Option<[f64; N]> = Noted::read("viscous", &from["viscous"])?;
+        let arm = Self::new(lengths, masses, gravity)?;
+        Ok(arm.with_friction(viscous.unwrap_or([0.0; N]))?)
     }
 }
 

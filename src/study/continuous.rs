@@ -4,7 +4,7 @@
 
 use super::control_loop::ControlLoop;
 use crate::math::arm::State;
-use crate::math::dynamics::forward_dynamics;
+use crate::math::dynamics::{forward_dynamics, less_friction};
 use crate::math::integrator::increment;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use crate::math::simulation::add_carried;
@@ -48,7 +48,13 @@ impl<const N: usize> ContinuousLoop<N> {
                 + ki[i] * integral[i].clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT)
                 + kd[i] * (velocity[i] - v[i])
         });
-        forward_dynamics(&self.control.arm, q, v, &effort)
+        let arm = &self.control.arm;
+        let effort = if arm.has_friction() {
+            less_friction(arm.viscous(), v, &effort)
+        } else {
+            effort
+        };
+        forward_dynamics(arm, q, v, &effort)
     }
 
     /// Takes a step. Returns `false`, and changes nothing, if the result would not be finite.

@@ -7,6 +7,7 @@
 
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
+use crate::math::limits::Limits;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::{ControlPeriod, DEFAULT_TIMESTEP, Simulation};
 
@@ -25,6 +26,9 @@ pub struct ControlLoop<const N: usize> {
     pub timestep: f64,
     /// When the law runs.
     pub period: ControlPeriod,
+    /// The limits of the motors, and the anti-windup. Predictions near an equilibrium hold while no effort is at its
+    /// limit.
+    pub limits: Limits<N>,
 }
 
 impl<const N: usize> ControlLoop<N> {
@@ -37,6 +41,7 @@ impl<const N: usize> ControlLoop<N> {
             method: Method::Rk4,
             timestep: DEFAULT_TIMESTEP,
             period: ControlPeriod::default(),
+            limits: Limits::default(),
         }
     }
 
@@ -64,6 +69,7 @@ impl<const N: usize> ControlLoop<N> {
             method: simulation.method(),
             timestep: simulation.timestep(),
             period: simulation.control_period(),
+            limits: *simulation.limits(),
         }
     }
 
@@ -117,6 +123,7 @@ impl<const N: usize> ControlLoop<N> {
         simulation.set_method(self.method);
         simulation.set_timestep(self.timestep);
         simulation.set_control_period(self.period);
+        simulation.set_limits(self.limits);
         simulation.set_state(start);
         simulation.set_setpoint(self.setpoint);
         simulation.enable(!self.is_free());

@@ -59,10 +59,15 @@ pub(super) fn critical<const N: usize>(
     (found.growth_per_step.is_finite() && found.frequency.is_finite()).then_some(found)
 }
 
-/// The index of the largest of the first `joints` entries of an eigenvector, in real arithmetic. For the eigenvalue
-/// `a + i b`, the invariant plane is the null space of `(E - a)² + b²`. If x lies in it, `x - i (E - a) x / b` is the
-/// eigenvector.
+/// The index of the largest of the first `joints` entries of an eigenvector.
 fn furthest(generator: &Matrix, mu: Complex, joints: usize) -> Option<usize> {
+    let shape = shape(generator, mu)?;
+    (0..joints).max_by(|&i, &j| shape[i].modulus().total_cmp(&shape[j].modulus()))
+}
+
+/// An eigenvector, in real arithmetic. For the eigenvalue `a + i b`, the invariant plane is the null space of
+/// `(E - a)² + b²`. If x lies in it, `x - i (E - a) x / b` is the eigenvector.
+pub(super) fn shape(generator: &Matrix, mu: Complex) -> Option<Vec<Complex>> {
     // The shift is slightly off the eigenvalue, where the matrix would be singular.
     let shift = mu.re + 1e-6 * mu.modulus();
     let shifted = generator.clone().plus_diagonal(-shift);
@@ -70,9 +75,9 @@ fn furthest(generator: &Matrix, mu: Complex, joints: usize) -> Option<usize> {
     let matrix = if mu.im == 0.0 { &shifted } else { &square };
     let x = matrix.most_shortened()?;
     let image = |i: usize| -> f64 { x.iter().enumerate().map(|(j, x)| shifted[(i, j)] * x).sum() };
-    let reach = |i: usize| {
-        let across = if mu.im == 0.0 { 0.0 } else { image(i) / mu.im };
-        x.get(i).map_or(0.0, |x| hypot(*x, across))
+    let entry = |(i, re): (usize, &f64)| Complex {
+        re: *re,
+        im: if mu.im == 0.0 { 0.0 } else { -image(i) / mu.im },
     };
-    (0..joints).max_by(|&i, &j| reach(i).total_cmp(&reach(j)))
+    Some(x.iter().enumerate().map(entry).collect())
 }

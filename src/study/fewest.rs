@@ -15,6 +15,9 @@ const ALL: u64 = 256;
 
 const NEIGHBOURS: u64 = 16;
 
+/// Most bisections. A usual search needs one or two.
+const MOST_BISECTIONS: u32 = 64;
+
 /// A run with any number of steps.
 pub trait StepTrial {
     /// Whether the run with this number of steps is accurate enough.
@@ -52,7 +55,7 @@ pub async fn fewest(first: u64, most: u64, part: u64, mut trial: impl StepTrial)
     }
     // If the largest number fails, a smaller one may still pass.
     let mut end = most.saturating_add(1);
-    loop {
+    for _ in 0..MOST_BISECTIONS {
         if let Some(mut enough) = best {
             while enough - too_few > (enough / part.max(1)).max(1) {
                 let middle = too_few + (enough - too_few) / 2;
@@ -78,4 +81,5 @@ pub async fn fewest(first: u64, most: u64, part: u64, mut trial: impl StepTrial)
         }
         (too_few, best) = (next - stride, Some(next));
     }
+    best
 }

@@ -3,12 +3,13 @@
 //! The arm under the control law rests where `kp (q* - q) + kd q̇* + ki I = G(q)` holds at every joint. For a small
 //! deviation `(x, v)` from the equilibrium, velocity products are of second order. The linear part is
 //!
-//! `v̇ = -S x + M⁻¹ u`,  `S = M⁻¹ ∂G/∂q`,  `u = -kp x - kd v + ki s`,  `ṡ = -x`
+//! `v̇ = -S x + M⁻¹ (u - b v)`,  `S = M⁻¹ ∂G/∂q`,  `u = -kp x - kd v + ki s`,  `ṡ = -x`
 //!
 //! | symbol | name | unit |
 //! | --- | --- | --- |
 //! | S | restoring acceleration of gravity per angle | 1/s² |
 //! | M⁻¹ | inverse of the mass matrix | 1/(kg m²) |
+//! | b | viscous friction | N m s/rad |
 //! | s | deviation of the integral, of the joints that have one | rad s |
 //!
 //! M⁻¹ and S are columns of forward dynamics without gravity, so they are as accurate as the arm's own kernel. A dense
@@ -29,6 +30,8 @@ pub struct Linear {
     pub gravity: Matrix,
     /// `M⁻¹` \[1/(kg m²)\].
     pub inverse_mass: Matrix,
+    /// Viscous friction \[N m s/rad\].
+    pub viscous: Vec<f64>,
     /// Proportional gains \[N m/rad\].
     pub kp: Vec<f64>,
     /// Derivative gains \[N m s/rad\].
@@ -61,6 +64,7 @@ impl Linear {
         Self {
             gravity,
             inverse_mass,
+            viscous: arm.viscous().to_vec(),
             kp: gains.kp.to_vec(),
             kd: gains.kd.to_vec(),
             integrals: (0..N)
@@ -86,6 +90,7 @@ impl Linear {
         Self {
             gravity: Matrix::from_fn(1, |_, _| stiffness),
             inverse_mass: Matrix::from_fn(1, |_, _| 1.0),
+            viscous: vec![0.0],
             kp: vec![kp],
             kd: vec![kd],
             integrals: if ki > 0.0 { vec![(0, ki)] } else { vec![] },
@@ -166,6 +171,7 @@ impl Linear {
             plant[(i, n + i)] = 1.0;
             for j in 0..n {
                 plant[(n + i, j)] = -self.gravity[(i, j)];
+                plant[(n + i, n + j)] -= self.inverse_mass[(i, j)] * self.viscous[j];
                 plant[(n + i, 2 * n + j)] = self.inverse_mass[(i, j)];
             }
         }

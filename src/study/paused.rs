@@ -67,9 +67,10 @@ const WORK_PER_PIECE: u64 = 2000;
 pub(super) struct PieceWork(u64);
 
 impl PieceWork {
-    /// Counts `evaluations`, and ends the piece at [`WORK_PER_PIECE`].
+    /// Counts `evaluations`, and ends the piece at [`WORK_PER_PIECE`]. A turn without evaluations counts as one, so that
+    /// a loop of such turns is divided too.
     pub(super) async fn spend(&mut self, evaluations: u64) {
-        self.0 += evaluations;
+        self.0 = self.0.saturating_add(evaluations.max(1));
         if self.0 >= WORK_PER_PIECE {
             self.0 = 0;
             pause().await;

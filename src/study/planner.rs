@@ -89,6 +89,15 @@ pub enum PlanError {
     /// A duration that is too long \[s\].
     #[error("duration must be at most {MAX_DURATION} s, got {}", shown_against(*.0, MAX_DURATION))]
     TooLong(f64),
+    /// A control period that is too long \[s\].
+    #[error("control_period must be at most {MAX_DURATION} s, got {}", shown_against(*.0, MAX_DURATION))]
+    PeriodTooLong(f64),
+    /// More control periods than [`MAX_STEPS`].
+    #[error(
+        "duration / control_period must be at most {MAX_STEPS} periods, got {}",
+        shown_against(*.0, in_f64(MAX_STEPS))
+    )]
+    TooManyPeriods(f64),
     /// The motion amplifies rounding beyond the allowed error, or changes too fast to be computed. The distance between
     /// two references \[m\]; infinite if there are no two.
     #[error("error must be larger or duration shorter: {}", known(*.0))]
@@ -118,6 +127,14 @@ pub enum PlanError {
 pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     if task.duration.is_nan() || task.duration > MAX_DURATION {
         return Err(PlanError::TooLong(task.duration));
+    }
+    let period = task.control.given_period();
+    if period > MAX_DURATION {
+        return Err(PlanError::PeriodTooLong(period));
+    }
+    let periods = (task.duration / period).ceil();
+    if period > 0.0 && periods > in_f64(MAX_STEPS) {
+        return Err(PlanError::TooManyPeriods(periods));
     }
     let mut loops = Vec::new();
     for method in Method::ALL.into_iter().rev() {

@@ -6,7 +6,7 @@
 //! Then the poses in between are searched. A climb starts from every local maximum of the grid and ascends the growth
 //! at the smallest limit so far. If a mode grows at a pose, its limit is smaller. Poses that are unstable in continuous
 //! time because of gravity are left out, since no timestep stabilises them. Without gravity they count, since the gains
-//! are then the cause.
+//! are then the cause. A free arm has no gains, so only poses with gravity count.
 //!
 //! An arm whose joints integrate can be sent to every pose, also to unstable ones. Towards the border of unstable poses
 //! the limit falls to zero. They are therefore searched first, by ascending the largest real part of any mode in
@@ -147,7 +147,11 @@ impl<const N: usize> PoseSearch<N> {
             turned.pose[0] = part_of_turn(part, DIRECTIONS);
             turned
         });
-        std::iter::once(weightless).chain(heavy)
+        // Without gravity a free arm only drifts.
+        let drifts = has_gravity && self.control.is_free();
+        std::iter::once(weightless)
+            .skip(usize::from(drifts))
+            .chain(heavy)
     }
 
     fn judge(&mut self, candidate: &PoseCandidate<N>) {
@@ -180,7 +184,7 @@ impl<const N: usize> PoseSearch<N> {
         let linear = candidate.linear(&self.control);
         let Some(sampling) = self.sampling else {
             let modes = Modes::of(&linear);
-            if modes.run_away() {
+            if modes.clearly_grow() {
                 self.least = (Some(0.0), *candidate);
             }
             return modes.growth();

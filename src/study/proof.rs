@@ -137,7 +137,7 @@ impl<const N: usize> Proof<N> {
         let ControlLoop {
             arm, gains, method, ..
         } = control;
-        if control.period.delay {
+        if control.period.delay || arm.has_friction() {
             return None;
         }
         let mut proof = Self {

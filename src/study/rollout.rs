@@ -279,6 +279,9 @@ const LONGEST_STEP: f64 = 2.5e-4;
 /// Most of its steps per step of the run. If those are long, its own are longer, which their uncertainty shows.
 const MOST_STEPS: u64 = 256;
 
+/// Most steps of an ideal loop: some ten seconds of one core. [`MAX_STEPS`] short steps take half of them.
+const MAX_IDEAL_STEPS: u64 = 4 * MAX_STEPS;
+
 /// The loop with a continuous-time law. Its timestep divides that of the run.
 struct Ideal<const N: usize> {
     /// `None` once it has diverged.
@@ -302,7 +305,8 @@ impl<const N: usize> Ideal<N> {
     /// Follows the run by this number of its steps.
     async fn follow(&mut self, steps: u64, piece: &mut PieceWork) {
         for _ in 0..steps * self.parts {
-            self.run.take_if(|run| !run.step());
+            self.run
+                .take_if(|run| run.steps >= MAX_IDEAL_STEPS || !run.step());
             if self.run.is_none() {
                 return;
             }
@@ -319,7 +323,9 @@ pub(super) struct Reference<const N: usize> {
     hold: Hold<N>,
     /// Length of a step of the run \[s\].
     timestep: f64,
-    /// Whether the motion changed too fast to be computed.
+    /// Calls of [`Reference::follow`]. Each counts as work, even if it is too short for a coefficient.
+    spans: u64,
+    /// Whether the motion changed too fast to be computed, or needed too much work.
     is_lost: bool,
 }
 
@@ -334,8 +340,9 @@ impl<const N: usize> Reference<N> {
             arm: neighbour(&control.arm, index),
             taylor: TaylorReference::new(start).cut(if index == 1 { 2 } else { 1 }),
             pid: control.simulation(start).pid().clone(),
-            hold: Hold::new(held, control.timestep),
+            hold: Hold::new(held, control.limits, control.timestep),
             timestep: control.timestep,
+            spans: 0,
             is_lost: false,
         }
     }
@@ -345,6 +352,7 @@ impl<const N: usize> Reference<N> {
         if self.is_lost {
             return;
         }
+        self.spans += 1;
         let mut effort = [0.0; N];
         if self.pid.is_enabled() {
             let (control, held) = self.hold.begin_step(&self.pid, self.taylor.state());
@@ -356,9 +364,13 @@ impl<const N: usize> Reference<N> {
         let followed = self
             .taylor
             .follow_in_pieces(&self.arm, &effort, span, piece);
-        self.is_lost = !followed.await;
+        self.is_lost = !followed.await || self.taylor.coefficients() > MAX_RUN_COEFFICIENTS;
     }
 }
+
+/// Most series coefficients of a reference of a rollout: half a minute of one core. [`MAX_STEPS`] short steps take half of
+/// them.
+const MAX_RUN_COEFFICIENTS: u64 = 200_000_000;
 
 /// Most series coefficients of a motion that is compared step by step: a few seconds of one core.
 const MAX_COEFFICIENTS: u64 = 40_000_000;
@@ -373,7 +385,7 @@ impl<const N: usize> Steppable<N> for Reference<N> {
     }
 
     fn evaluations(&self) -> u64 {
-        self.taylor.coefficients()
+        self.taylor.coefficients() + self.spans
     }
 
     fn state(&self) -> &State<N> {
@@ -394,5 +406,7 @@ fn neighbour<const N: usize>(arm: &Arm<N>, index: usize) -> Arm<N> {
             _ => (length.next_up(), mass.next_down()),
         };
     }
-    Arm::new(lengths, masses, arm.gravity()).unwrap_or(*arm)
+    let neighbour = Arm::new(lengths, masses, arm.gravity());
+    let neighbour = neighbour.and_then(|one| one.with_friction(*arm.viscous()));
+    neighbour.unwrap_or(*arm)
 }

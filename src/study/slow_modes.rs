@@ -10,7 +10,6 @@
 //!
 //! **Invariant:** the work is bounded, and growth within rounding error does not count.
 
-use super::linear::Linear;
 use super::matrix::{Complex, Matrix};
 
 /// A mode is slow if its rate is below this part of the fastest rate.
@@ -29,15 +28,14 @@ const NEAR: f64 = 100.0;
 
 /// Whether a mode grows that is slow compared with the fastest `rate` \[1/s\]. Its growth is less than `doubtful`
 /// \[1/s\], so rounding may have hidden it.
-pub(super) fn grows(linear: &Linear, modes: &[Complex], rate: f64, doubtful: f64) -> bool {
+pub(super) fn grows(flow: &Matrix, modes: &[Complex], rate: f64, doubtful: f64) -> bool {
     let is_slow = |size: f64, growth: f64| size < SLOWER * rate && growth.abs() < doubtful;
     if !modes.iter().any(|mode| is_slow(mode.modulus(), mode.re)) {
         return false;
     }
-    let flow = linear.flow();
-    let sizes = [modes, &shifted_modes(&flow, 0.0)].concat();
+    let sizes = [modes, &shifted_modes(flow, 0.0)].concat();
     sizes.into_iter().map(Complex::modulus).any(|size| {
-        shifted_modes(&flow, SHIFT * size).into_iter().any(|mode| {
+        shifted_modes(flow, SHIFT * size).into_iter().any(|mode| {
             let modulus = mode.modulus();
             let keeps_digits = modulus > size / NEAR && modulus < NEAR * size;
             keeps_digits && is_slow(modulus, mode.re) && mode.re > GROWTH * modulus

@@ -24,6 +24,7 @@ pub use super::critical::{BEYOND, Critical};
 pub use super::limits::{ADVISED_PART, Limits, Rest, limit_held, limits, search_limits};
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix, largest, largest_above};
+use super::paused::{at_once, pause};
 pub use super::proof::most_bytes;
 use super::slow_modes;
 use crate::math::integrator::Method;
@@ -31,6 +32,11 @@ use crate::math::integrator::Method;
 /// Growth within rounding error, relative to the fastest eigenvalue. The computed eigenvalues of graded 9×9 matrices
 /// have errors of some 1e-13.
 pub(super) const NEUTRAL: f64 = 1e-11;
+
+/// Modes below this part of the fastest rate say nothing about the timestep. Rounding spreads a double eigenvalue at zero,
+/// such as that of a joint that drifts, to the square root of its size, so such a mode may only seem to grow. The growth
+/// that a timestep causes is below [`NEUTRAL`] for all of them, and [`slow_modes`] finds growth in continuous time.
+const DOUBTFUL: f64 = 1e-6;
 
 /// Start of the search, in units of the fastest time constant. An undamped swing already grows measurably here under
 /// Euler (1e-3) and midpoint (2.5e-10).
@@ -81,10 +87,15 @@ pub(super) struct Modes {
 
 impl Modes {
     pub(super) fn of(linear: &Linear) -> Self {
-        let eigenvalues = linear.flow().eigenvalues();
+        Self::of_flow(&linear.flow())
+    }
+
+    /// The modes of `ẋ = flow · x`.
+    pub(super) fn of_flow(flow: &Matrix) -> Self {
+        let eigenvalues = flow.eigenvalues();
         let rate = largest(eigenvalues.iter().map(|mode| mode.modulus()));
         Self {
-            slow_growth: slow_modes::grows(linear, &eigenvalues, rate, NEUTRAL * rate),
+            slow_growth: slow_modes::grows(flow, &eigenvalues, rate, DOUBTFUL * rate),
             rate,
             eigenvalues,
         }
@@ -101,12 +112,19 @@ impl Modes {
         growth.fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// Whether a mode clearly grows, also if rounding has spread a double eigenvalue near zero.
+    pub(super) fn clearly_grow(&self) -> bool {
+        let least = DOUBTFUL * self.rate;
+        let grows = |mode: &Complex| mode.modulus() >= least && mode.re > 0.1 * NEUTRAL * self.rate;
+        self.slow_growth || self.eigenvalues.iter().any(grows)
+    }
+
     /// Whether a mode is unstable at every timestep. It grows, or is so close to neutral that rounding decides its
     /// sign: a double eigenvalue near zero has an error of the square root of the rounding error.
     pub(super) fn run_away(&self) -> bool {
         let noise = 0.1 * NEUTRAL * self.rate;
         let grows = |mode: &Complex| {
-            let is_doubtful = mode.modulus() > 0.0 && mode.modulus() < 1e-6 * self.rate;
+            let is_doubtful = mode.modulus() > 0.0 && mode.modulus() < DOUBTFUL * self.rate;
             mode.re > if is_doubtful { -noise } else { noise } || mode.re.is_nan()
         };
         self.slow_growth || self.eigenvalues.iter().any(grows)
@@ -184,9 +202,13 @@ impl<'a> Stepping<'a> {
         match self.sampling {
             Sampling::Continuous => free,
             Sampling::Held if self.delayed => {
-                self.linear.closed_late(&self.repeated(&free, h), period)
+                let arm = repeated(&free, h, self.substeps);
+                self.linear.closed_late(&arm, period)
             }
-            Sampling::Held => self.linear.closed(&self.repeated(&free, h), period),
+            Sampling::Held => {
+                let arm = repeated(&free, h, self.substeps);
+                self.linear.closed(&arm, period)
+            }
         }
     }
 
@@ -209,31 +231,9 @@ impl<'a> Stepping<'a> {
         rows(&second, &a.clone().plus(0.5 * h, &a.product(&predicted)))
     }
 
-    /// `((I + h E)^m - I) / (m h)` for the `m` substeps of a period, by repeated squaring.
-    fn repeated(&self, step: &Matrix, h: f64) -> Matrix {
-        let mut sum = step.clone();
-        // Each binary digit of `m` after the first doubles the number of steps, and a 1 adds one.
-        for digit in (0..self.substeps.ilog2()).rev() {
-            let square = sum.product(&sum);
-            sum = sum.scaled(2.0).plus(h, &square);
-            if self.substeps >> digit & 1 == 1 {
-                let product = step.product(&sum);
-                sum = sum.plus(1.0, step).plus(h, &product);
-            }
-        }
-        sum.scaled(1.0 / f64::from(self.substeps))
-    }
-
-    /// Fastest growth of any mode, `max (2 Re μ + h |μ|²)`, relative to the largest `|μ|`; NaN if not finite.
+    /// Fastest growth of any mode in a period \[s\], as of [`growth`].
     pub(super) fn growth(&self, period: f64) -> f64 {
-        let values = self.generator(period).eigenvalues();
-        let fastest = largest(values.iter().map(|mu| mu.modulus()));
-        if fastest == 0.0 {
-            return 0.0;
-        }
-        let growth = |mu: Complex| 2.0 * mu.re + period * mu.modulus() * mu.modulus();
-        let growths = values.into_iter().map(|mu| growth(mu) / fastest);
-        largest_above(f64::NEG_INFINITY, growths)
+        growth(&self.generator(period), period)
     }
 
     /// Whether no mode grows at this period. NaN counts as unstable.
@@ -241,53 +241,94 @@ impl<'a> Stepping<'a> {
         self.growth(period) <= NEUTRAL
     }
 
-    /// Increases the period from far below the fastest time constant to the first unstable one, then bisects.
+    /// The first unstable period, as of [`first_unstable`].
     pub(super) fn search(&self, modes: &Modes) -> Option<f64> {
-        let rate = modes.rate;
-        if rate == 0.0 {
-            return None;
-        }
-        // At timesteps at which the fast modes are stable, the stability of the slow ones does not depend on the
-        // timestep.
-        if modes.slow_growth {
-            return Some(0.0);
-        }
-        let start = modes.tiny();
-        if !self.is_stable(start) {
-            // A loop with almost no damping may still be stable at periods a thousand times shorter. It must decay
-            // there. A loop that only seems neutral may grow too slowly to be detected, as an undamped swing does under
-            // midpoint.
-            let tiny = 1e-3 * start;
-            return if self.growth(tiny) < -NEUTRAL {
-                Some(self.boundary(tiny, start))
-            } else {
-                Some(0.0)
-            };
-        }
-        let mut stable = start;
-        while stable * rate < SEARCH_END {
-            let step = if stable * rate < SEARCH_FINE {
-                2.0
-            } else {
-                SEARCH_STEP
-            };
-            let next = step * stable;
-            if !self.is_stable(next) {
-                return Some(self.boundary(stable, next));
-            }
-            stable = next;
-        }
-        None
+        at_once(first_unstable(modes, |period| self.growth(period)))
     }
+}
 
-    fn boundary(&self, stable: f64, unstable: f64) -> f64 {
-        bisect((stable, unstable), 60, |period| self.is_stable(period))
+/// Fastest growth of any mode of `x ↦ (I + T E) x`, `max (2 Re μ + T |μ|²)`, relative to the largest `|μ|`; NaN if not
+/// finite.
+pub(super) fn growth(generator: &Matrix, period: f64) -> f64 {
+    let values = generator.eigenvalues();
+    let fastest = largest(values.iter().map(|mu| mu.modulus()));
+    if fastest == 0.0 {
+        return 0.0;
     }
+    let growth = |mu: Complex| 2.0 * mu.re + period * mu.modulus() * mu.modulus();
+    let growths = values.into_iter().map(|mu| {
+        let is_doubtful = mu.modulus() < DOUBTFUL * fastest;
+        let growth = growth(mu) / fastest;
+        if is_doubtful { growth.min(0.0) } else { growth }
+    });
+    largest_above(f64::NEG_INFINITY, growths)
+}
+
+/// `((I + h E)^m - I) / (m h)` for the `m` substeps of a period, by repeated squaring.
+pub(super) fn repeated(step: &Matrix, h: f64, substeps: u32) -> Matrix {
+    let mut sum = step.clone();
+    // Each binary digit of `m` after the first doubles the number of steps, and a 1 adds one.
+    for digit in (0..substeps.ilog2()).rev() {
+        let square = sum.product(&sum);
+        sum = sum.scaled(2.0).plus(h, &square);
+        if substeps >> digit & 1 == 1 {
+            let product = step.product(&sum);
+            sum = sum.plus(1.0, step).plus(h, &product);
+        }
+    }
+    sum.scaled(1.0 / f64::from(substeps))
+}
+
+/// Increases the period \[s\] from far below the fastest time constant to the first unstable one, then bisects. `growth`
+/// is that of a period, as of [`growth`]. A piece has one evaluation of it.
+pub(super) async fn first_unstable(modes: &Modes, growth: impl Fn(f64) -> f64) -> Option<f64> {
+    let rate = modes.rate;
+    if rate == 0.0 {
+        return None;
+    }
+    // At timesteps at which the fast modes are stable, the stability of the slow ones does not depend on the
+    // timestep.
+    if modes.slow_growth {
+        return Some(0.0);
+    }
+    let is_stable = |period: f64| growth(period) <= NEUTRAL;
+    let start = modes.tiny();
+    if !is_stable(start) {
+        // A loop with almost no damping may still be stable at periods a thousand times shorter. It must decay
+        // there. A loop that only seems neutral may grow too slowly to be detected, as an undamped swing does under
+        // midpoint.
+        let tiny = 1e-3 * start;
+        return if growth(tiny) < -NEUTRAL {
+            Some(bisect_in_pieces((tiny, start), 60, is_stable).await)
+        } else {
+            Some(0.0)
+        };
+    }
+    let mut stable = start;
+    while stable * rate < SEARCH_END {
+        let step = if stable * rate < SEARCH_FINE {
+            2.0
+        } else {
+            SEARCH_STEP
+        };
+        let next = step * stable;
+        pause().await;
+        if !is_stable(next) {
+            return Some(bisect_in_pieces((stable, next), 60, is_stable).await);
+        }
+        stable = next;
+    }
+    None
 }
 
 /// The boundary between a value for which a condition holds and a larger one for which it does not. The search ends at
 /// a relative width of 1e-13, or after the given number of halvings of the logarithm.
-pub(crate) fn bisect(
+pub(crate) fn bisect(range: (f64, f64), halvings: u32, holds: impl Fn(f64) -> bool) -> f64 {
+    at_once(bisect_in_pieces(range, halvings, holds))
+}
+
+/// The same; a piece has one evaluation of the condition.
+pub(super) async fn bisect_in_pieces(
     (mut holding, mut failing): (f64, f64),
     halvings: u32,
     holds: impl Fn(f64) -> bool,
@@ -297,6 +338,7 @@ pub(crate) fn bisect(
         if middle <= holding || middle >= failing || failing - holding < 1e-13 * holding {
             break;
         }
+        pause().await;
         *(if holds(middle) {
             &mut holding
         } else {
@@ -307,7 +349,7 @@ pub(crate) fn bisect(
 }
 
 /// `A + h/2 A² + … + h^(p-1)/p! A^p`, by Horner's rule.
-fn runge_kutta(a: &Matrix, order: u32, h: f64) -> Matrix {
+pub(super) fn runge_kutta(a: &Matrix, order: u32, h: f64) -> Matrix {
     let mut sum = a.clone();
     for k in (2..=order).rev() {
         sum = a.clone().plus(h / f64::from(k), &a.product(&sum));

@@ -169,6 +169,8 @@ fn arguments(links: usize) -> Vec<Value> {
         json!({"steps": 25, "effort": per_joint(1.0)}),
         json!({"steps": 0, "effort": per_joint(1e9)}),
         json!({"effort": per_joint(4.0), "duration": 0.25}),
+        json!({"viscous": per_joint(0.4)}),
+        json!({"effort": null, "anti_windup": "back_calculation", "tracking_time": 0.3}),
         json!({"effort": per_joint(4.0), "duration": 0}),
         json!({"x": 0.7, "y": 0.9, "phi": 0.4}),
         json!({"x": 70, "y": 0.9, "phi": 0.4}),
@@ -201,8 +203,9 @@ fn is_of_the_study(links: usize, service: &str, args: &Value) -> bool {
 }
 
 /// The services of the page, and one more; the others need a server.
-const SERVED: [&str; 20] = [
+const SERVED: [&str; 22] = [
     "/arm_sim/set_params",
+    "/arm_sim/set_friction",
     "/arm_sim/set_integrator",
     "/arm_sim/set_state",
     "/arm_sim/step",
@@ -210,6 +213,7 @@ const SERVED: [&str; 20] = [
     "/arm_sim/pause",
     "/arm_sim/disturb",
     "/pid_controller/set_gains",
+    "/pid_controller/set_limits",
     "/pid_controller/set_period",
     "/pid_controller/enable",
     "/ik/solve",

@@ -28,6 +28,17 @@ class AloneTest(PageTest):
             page.until(f"window.received[{part}] === '{said}'")
         self.assertEqual(page.complaints, [])
 
+    def test_in_a_frame_of_text_a_first_script_gives_it_a_step_and_settings(self):
+        page = self.visit("about:blank")
+        text = FILE.read_text().replace("<script", "<script>location.hash = '#step=2&links=3&timestep=0.002';</script><script", 1)
+        page.run("""((text) => { const frame = document.createElement("iframe"); frame.width = 1200; frame.height = 800;
+          frame.srcdoc = text; document.body.append(frame); })(%s)""" % json.dumps(text))
+        inside = "document.querySelector('iframe').contentDocument"
+        page.until(f"{inside}.querySelector('#offer')?.textContent.includes('timestep 0.002')", why="the settings are offered")
+        page.until(f"{inside}.querySelector('#course-number').textContent.startsWith('Step 2')")
+        page.until(f"{inside}.querySelector('#links').value === '3'")
+        self.assertEqual(page.complaints, [])
+
     def test_without_a_worker_the_page_itself_runs_the_arm(self):
         page = self.visit("about:blank")
         page.send("Page.addScriptToEvaluateOnNewDocument", {"source": "window.Worker = class { constructor() { throw new Error('forbidden'); } };"})
@@ -53,7 +64,7 @@ class AloneTest(PageTest):
         page.run("window.old = 1; document.querySelector('#links').value = '2'; document.querySelector('#links').dispatchEvent(new Event('change'))")
         page.until(f"window.old === undefined && {SHOWN} && document.querySelector('#links').value === '2'", why="the page anew")
         self.assertEqual(len(self.runtime.next("/joint_states")["position"]), 2)
-        self.assertEqual(page.run("location.hash"), "#step=2&links=2")
+        self.assertEqual(page.run("location.hash"), "#step=slow&links=2")
         self.assertEqual(page.complaints, [])
 
     def test_the_address_keeps_the_number_of_links_and_another_one_brings_that_arm(self):
@@ -64,6 +75,6 @@ class AloneTest(PageTest):
             self.assertEqual(page.run("location.hash"), after)
         page.until("document.querySelector('#course-start').textContent === 'Restart step'", why="a step that starts at once")
         page.click("#course-next")
-        self.assertEqual(page.run("location.hash"), "#step=5&links=2")
+        self.assertEqual(page.run("location.hash"), "#step=timestep&links=2")
         page.click("#view-switch")
         self.assertEqual(page.run("location.hash"), "#links=2")

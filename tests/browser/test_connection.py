@@ -1,5 +1,8 @@
 """The connection: it comes back by itself, and a token that it needs does not stay in the address."""
 
+import signal
+import time
+
 from runtime import Runtime
 from stage import PageTest, needs_server
 
@@ -14,22 +17,25 @@ class Reconnecting(PageTest):
         self.page.expect_network_errors = True  # the browser itself reports refused connections
         self.runtime.stop()
         self.page.until("document.querySelector('#notice').textContent.startsWith('Connection lost')")
-        self.assertIn("The connection is lost", self.page.text("#course-status"))
+        self.assertIn("Connection lost", self.page.text("#course-status"))
         self.page.click("#defaults")
         # The timestep has no verdict, and what is typed or pressed is refused.
         self.page.until("document.querySelector('#run-state').textContent === 'no connection'")
-        self.assertEqual(self.page.run("[document.querySelector('#verdict').textContent, document.querySelector('#verdict-pill').hidden, document.querySelector('#undo').disabled, document.querySelector('#course-start').disabled]"), ["", True, True, True])
+        self.assertEqual(self.page.run("[document.querySelector('#verdict').textContent, document.querySelector('#verdict-pill').hidden, "
+            "document.querySelector('#undo').disabled, document.querySelector('#course-start').disabled]"), ["", True, True, True])
         self.assertNotIn("defaults", self.page.text("#announce-polite"), "nothing was set")
         self.page.until("document.querySelector('#out-rtf').textContent.startsWith('–')")
         for field, typed in (("#setpoint-fields", "1"), ("#timestep-field", "2")):
             self.page.fill(f"{field} input[type=number]", typed)
         self.page.click("#compare-form button[type=submit]")
-        refused = "[...document.querySelectorAll('#setpoint-fields .refusal, #timestep-field .refusal, #compare-form .refusal')].map((one) => one.textContent).filter(Boolean)"
+        refused = ("[...document.querySelectorAll('#setpoint-fields .refusal, #timestep-field .refusal, #compare-form .refusal')]"
+                   ".map((one) => one.textContent).filter(Boolean)")
         self.page.until(f"{refused}.length === 3 && {refused}.every((one) => one.includes('not connected'))")
         # It retries meanwhile and fails, so the messages stay.
         self.page.run("own('store.js').then(({ watch }) => { window.tries = 0; watch('connection', () => { window.tries += 1; }); })")
         self.page.until("window.tries >= 2", why="two more changes")
         self.assertEqual(self.page.run(f"{refused}.length"), 3)
+        self.page.until("document.querySelector('#notice').textContent.includes(`--allow-origin ${location.origin}`)", why="what may be wrong")
         self.runtime.start()
         self.connected()
         self.page.until("document.querySelector('#gravity-field input[type=number]').value === '9.81'", why="the new runtime's gravity")
@@ -51,6 +57,26 @@ class Reconnecting(PageTest):
         oldest = "own('history.js').then(({ record, TIME }) => record.data[record.at(0) + TIME])"
         self.page.until("own('history.js').then(({ record }) => record.length > 10)")
         self.assertGreater(self.page.run(oldest), before + 2)
+
+
+@needs_server("no server, no connection that others could have or lose")
+class Silent(PageTest):
+    course = True
+
+    def test_a_server_that_says_nothing_is_noticed_and_the_step_goes_on_with_it(self):
+        self.page.click("#course-start")
+        self.page.until("document.querySelector('#course-start').textContent === 'Restart step' && !document.querySelector('#course-dial').inert")
+        self.runtime.process.send_signal(signal.SIGSTOP)
+        try:
+            began = time.monotonic()
+            self.page.until("document.querySelector('#connection-text').textContent === 'no answer' && "
+                "document.querySelector('#run-state').textContent === 'no connection'")
+            self.assertLess(time.monotonic() - began, 8)
+            self.assertIn("No answer", self.page.text("#course-status"))
+        finally:
+            self.runtime.process.send_signal(signal.SIGCONT)
+        self.connected()
+        self.assertEqual(self.page.text("#course-start"), "Restart step", "the step is not lost")
 
 
 @needs_server("no server, no connection that others could have or lose")

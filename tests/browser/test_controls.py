@@ -9,6 +9,25 @@ class Controls(PageTest):
     def field(self, name, joint=None):
         return f"#{name} {NUMBER}" if joint is None else f"#{name} .field:nth-of-type({joint}) {NUMBER}"
 
+    # Realism
+
+    def test_switches_limit_the_efforts_and_add_friction_and_a_link_has_both(self):
+        self.page.until("document.querySelector('#realism').checkVisibility() && document.querySelector('#friction-switch').checkVisibility()")
+        self.page.click("#limit-switch")
+        self.wait(lambda: self.values("/pid_controller/set_limits")["effort"] == [30, 8], "1.5 times the weight")
+        self.page.fill(self.field("limit-fields", 1), "25")
+        self.wait(lambda: self.values("/pid_controller/set_limits")["effort"] == [25, 8], "a limit")
+        self.page.run("(() => { const one = document.querySelector('#limit-options select'); one.value = 'conditional';"
+                      " one.dispatchEvent(new Event('change')); })()")
+        self.wait(lambda: self.values("/pid_controller/set_limits")["anti_windup"] == "conditional", "a cure")
+        self.page.click("#friction-switch")
+        self.wait(lambda: self.values("/arm_sim/set_friction")["viscous"] == [1, 1], "friction")
+        link = self.page.run("own('views.js').then((share) => share.address())")
+        self.assertIn("viscous=1,1&effort_limit=25,8&anti_windup=conditional", link)
+        self.page.click("#limit-switch")
+        self.page.click("#friction-switch")
+        self.wait(lambda: (self.values("/pid_controller/set_limits")["effort"], self.values("/arm_sim/set_friction")["viscous"]) == (None, [0, 0]), "off")
+
     # The view
 
     def test_a_shift_drag_places_the_setpoint_without_a_goal(self):
@@ -199,7 +218,8 @@ class Controls(PageTest):
         self.tab("compare")
         press = "document.querySelector('#compare-form button').click(), "  # does nothing while a comparison is computed
         for times, why in (
-            ((10, 0), "duration must be greater than 0"), ((10, -1), "duration must be greater than 0"), ((1000, 0.5), "duration must be at least the timestep 1"),
+            ((10, 0), "duration must be greater than 0"), ((10, -1), "duration must be greater than 0"), ((1000, 0.5),
+                "duration must be at least the timestep 1"),
             ((-5, 5), "timestep must be greater than 0"), ((0, 5), "timestep must be greater than 0"),
         ):
             self.page.run(f"document.querySelectorAll('#compare-form {NUMBER}').forEach((one, i) => {{ one.value = {list(times)}[i]; }})")
@@ -268,7 +288,8 @@ class Controls(PageTest):
 
     def test_everything_is_reached_by_the_tab_key_and_named(self):
         named = self.page.run("""[...document.querySelectorAll('button, input, select, summary, canvas[tabindex]')]
-            .filter((one) => one.checkVisibility() && !(one.textContent.trim() || one.ariaLabel || one.labels?.length || one.title)).map((one) => one.outerHTML)""")
+            .filter((one) => one.checkVisibility() && !(one.textContent.trim() || one.ariaLabel || one.labels?.length || one.title))
+            .map((one) => one.outerHTML)""")
         self.assertEqual(named, [])
         seen = set()
         for _ in range(120):
@@ -294,8 +315,10 @@ class Controls(PageTest):
 
     def test_a_refused_setting_of_a_link_is_shown(self):
         for link, why in (
-            ("setpoint=1,2,3", "setpoint must have 2 entries, got 3"), ("setpoint=abc,1", "setpoint 1 must be a number"), ("gravity=", "gravity must be a number"),
-            ("method=foo&gravity=3", 'method must be one of euler, midpoint, verlet, rk4, got "foo"'), ("controller=maybe", 'controller must be on or off, got "maybe"'),
+            ("setpoint=1,2,3", "setpoint must have 2 entries, got 3"), ("setpoint=abc,1", "setpoint 1 must be a number"), ("gravity=",
+                "gravity must be a number"),
+            ("method=foo&gravity=3", 'method must be one of euler, midpoint, verlet, rk4, got "foo"'), ("controller=maybe",
+                'controller must be on or off, got "maybe"'),
         ):
             self.page.run(f"location.hash = '{link}'")
             self.page.until(f"document.querySelector('#offer .offer-text')?.textContent.startsWith('{link.split('=')[0]}')", why=link)

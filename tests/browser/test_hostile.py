@@ -32,7 +32,8 @@ TRIES = """
     ["img", { src: `${base}/icon.svg` }], ["img", { src: `${base}/report/figure.svg` }], ["object", { data: `${base}/report/` }],
   ]) told.loads[`${tag} ${Object.values(attributes)}`] = await loaded(tag, attributes);
   told.loads.opaque = await fetch(`${base}/report/`, { mode: "no-cors" }).then(() => "loaded", () => "failed");
-  told.loads.events = await new Promise((done) => { const one = new EventSource(`${base}/`); one.onopen = () => done("open"); one.onerror = () => { one.close(); done("failed"); }; });
+  told.loads.events = await new Promise((done) => { 
+    const one = new EventSource(`${base}/`); one.onopen = () => done("open"); one.onerror = () => { one.close(); done("failed"); }; });
   for (const method of ["POST", "PUT", "PROPFIND", "patch", "LINK"]) told.methods[method] = await fetched(method, { body: frame });
   told.read = await fetched("GET");
   await fetch(`${base}/`, { method: "POST", mode: "no-cors", headers: { "content-type": "text/plain" }, body: frame }).catch(() => {});
@@ -98,7 +99,8 @@ class Hostile(PageTest):
         self.write("figure.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
         self.write("index.html", "report")
         told = self.tried(self.foreign())
-        self.assertEqual((told["socket"], told["read"], set(told["methods"].values()), set(told["loads"].values())), ("closed", "failed", {"failed"}, {"failed"}), told)
+        self.assertEqual((told["socket"], told["read"], set(told["methods"].values()), set(told["loads"].values())),
+            ("closed", "failed", {"failed"}, {"failed"}), told)
         self.unmoved()
 
     def test_these_tests_can_fail_because_a_local_page_is_accepted(self):

@@ -9,7 +9,8 @@ AXE = pathlib.Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 PANELS = ("plots", "stability", "error", "compare", "tasks")
 # Parts in sight whose content is wider than they are, and captions and figures that are not whole.
 CLIPPED = """[...document.querySelectorAll('figcaption, figure, main, section, details, .segment, input[type=number]')].filter((one) => one.checkVisibility()
-    && (one.scrollWidth > one.clientWidth || (one.matches('figcaption, figure') && one.scrollHeight > one.clientHeight))).map((one) => one.id || one.textContent)"""
+    && (one.scrollWidth > one.clientWidth || (one.matches('figcaption, figure') && one.scrollHeight > one.clientHeight)))
+    .map((one) => one.id || one.textContent)"""
 # Pairs of readouts whose texts overlap.
 OVERLAPS = """(() => {
   const boxes = [...document.querySelectorAll('.readouts > div')].map((one) => {
@@ -78,7 +79,8 @@ class Steady:
 
 class Desktop(Access, Steady, PageTest):
     def box(self, selector):
-        return self.page.run(f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; }})()")
+        return self.page.run(f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect();"
+                             " return [b.left, b.top, b.right, b.bottom]; })()")
 
     def test_the_first_screen_holds_the_arm_its_settings_and_a_panel(self):
         for selector in ("#arm", "#notice", "#transport", "#plot-phase", "#methods", "#timestep-field", "#kd-fields", "#masses-fields"):
@@ -147,7 +149,8 @@ class Phone(Free, Steady, Access, PageTest):
     view = PHONE
 
     def test_arm_integrator_and_controller_come_first(self):
-        tops, width = self.page.run("[['#arm', '#transport', '#methods', '#kp-fields', '#panel'].map((one) => document.querySelector(one).getBoundingClientRect().top), document.documentElement.scrollWidth]")
+        tops, width = self.page.run("[['#arm', '#transport', '#methods', '#kp-fields', '#panel'].map((one) => "
+            "document.querySelector(one).getBoundingClientRect().top), document.documentElement.scrollWidth]")
         self.assertEqual((tops, width), (sorted(tops), 390))
 
     def test_settings_that_fold_show_that_they_do(self):

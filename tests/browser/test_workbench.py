@@ -63,6 +63,8 @@ class Defaults(PageTest):
         present = {
             "integrator": self.values("/arm_sim/set_integrator"), "params": self.values("/arm_sim/set_params"),
             "gains": self.values("/pid_controller/set_gains"), "controller": self.values("/pid_controller/enable")["data"],
+            "friction": self.values("/arm_sim/set_friction"),
+            "motors": self.values("/pid_controller/set_limits"),
             "period": {key: value for key, value in self.values("/pid_controller/set_period").items() if key != "effective_period"},
         }
         self.assertEqual(self.page.run(f"own('settings.js').then(({{ DEFAULTS }}) => DEFAULTS[{self.links}])"), {**present, "setpoint": [0] * self.links})

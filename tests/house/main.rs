@@ -19,4 +19,3 @@ mod limits;
 mod papers;
 mod readme;
 mod tree;
-mod words;

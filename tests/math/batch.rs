@@ -6,6 +6,7 @@ use fastrand::Rng;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::{self, forward_dynamics};
 use pendularm::math::integrator::Method;
+use pendularm::math::limits::{AntiWindup, Limits};
 use pendularm::math::number::Registers;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::{ControlPeriod, Simulation, batch};
@@ -55,7 +56,11 @@ fn any_simulation<const N: usize>(rng: &mut Rng) -> Simulation<N> {
         ki: each(|| between(rng, 0.0, 3000.0)),
         kd: each(|| between(rng, 0.0, 100.0)),
     };
-    let mut simulation = Simulation::new(arm.unwrap(), gains);
+    let mut arm = arm.unwrap();
+    if rng.u32(..3) == 0 {
+        arm = arm.with_friction(each(|| between(rng, 0.0, 5.0))).unwrap();
+    }
+    let mut simulation = Simulation::new(arm, gains);
     simulation.set_method(*rng.choice(Method::ALL.iter()).unwrap());
     // The larger ones diverge within some steps.
     simulation.set_timestep(of_any_size(rng, 1e-5, 0.5));
@@ -82,6 +87,13 @@ fn any_simulation<const N: usize>(rng: &mut Rng) -> Simulation<N> {
             simulation.set_command(each(|| between(rng, -20.0, 20.0)));
         }
         _ => {}
+    }
+    if rng.u32(..3) == 0 {
+        simulation.set_limits(Limits {
+            effort: rng.bool().then(|| each(|| between(rng, 0.0, 50.0))),
+            anti_windup: *rng.choice(AntiWindup::ALL.iter()).unwrap(),
+            tracking_time: of_any_size(rng, 1e-4, 10.0),
+        });
     }
     if rng.u32(..3) == 0 {
         let duration = simulation.timestep() * between(rng, 0.1, 40.0);

@@ -9,8 +9,8 @@ import { SCENES, settingsOf } from "../../page/scenes.js";
 
 const words = (text) => text.split(/\s+/).length;
 
-test("ten steps, each with scenes, at most 40 words, and sentences of at most 25", () => {
-  assert.equal(STEPS.length, 10);
+test("eleven steps, each with scenes, at most 40 words, and sentences of at most 25", () => {
+  assert.equal(STEPS.length, 11);
   for (const { id, text, scene } of STEPS) {
     for (const links of [2, 3]) assert.equal(scene(links).gains.kp.length, links, id);
     assert.ok(words(text) <= 40, `${id}: ${words(text)} words`);
@@ -29,21 +29,33 @@ test("every question has one right answer, with the reason", () => {
 });
 
 test("no task is done before anything is done, and each can be", () => {
-  const all = { methods: new Set(["euler", "midpoint", "verlet", "rk4"]), reached: true, shook: true, shrinks: true, gain: 100, stable: true, measured: true, scenes: new Set("123"), energy: { since: 1, until: 4, low: 7, high: 7.5 }, sheet: true };
+  const all = { methods: new Set(["euler", "midpoint", "verlet", "rk4"]), reached: true, shook: true, shrinks: true, gain: 100, stable: true,
+    measured: true, scenes: new Set("123"), energy: { timestep: 0.005, since: 0.01, until: 10, low: -0.05, high: 0.1 }, sheet: true,
+      responses: { sag: true, overshoot: true, windup: true, cure: true } };
   for (const { id, task } of STEPS) {
     assert.equal(task.done(nothingSeen()), false, id);
     assert.equal(task.done(all), true, id);
   }
 });
 
-test("energy is kept if it varies little for three seconds", () => {
+test("energy is kept at 5 ms, for ten seconds from the start, within 0.1 J, and not otherwise", () => {
   const { done } = STEPS.find(({ id }) => id === "energy").task;
-  const keeps = (growth, seconds) => {
+  const keeps = ({ growth = 0, seconds = 10, timestep = 0.005, from = 0.016, of = () => "rk4" }) => {
     let { energy } = nothingSeen();
-    for (let time = 1; time <= 1 + seconds; time += 0.125) energy = followEnergy(energy, "rk4", time, 7 + growth * time);
+    for (let time = from; time <= seconds; time += 0.125) energy = followEnergy(energy, of(time), timestep, time, growth * time);
+    energy = followEnergy(energy, of(seconds), timestep, seconds, growth * seconds);
     return done({ ...nothingSeen(), energy });
   };
-  assert.deepEqual([keeps(0, 2), keeps(0, 3), keeps(0.1, 4), keeps(0.6, 9)], [false, true, true, false]);
+  assert.ok(keeps({}) && keeps({ growth: 0.0099 }) && keeps({ growth: -0.0099 }));
+  assert.ok(!keeps({ growth: 0.011 }) && !keeps({ growth: -0.011 }), "more than 0.1 J");
+  assert.ok(!keeps({ seconds: 9.9 }), "too short");
+  assert.ok(!keeps({ timestep: 0.01 }) && !keeps({ timestep: 0.001 }), "another timestep");
+  assert.ok(!keeps({ from: 1, seconds: 12 }), "not from the start");
+  assert.ok(!keeps({ of: (time) => (time < 2 ? "rk4" : "verlet"), seconds: 11.9 }), "another method on the way");
+  // What was lost stays lost, although the energy of the rest varies little.
+  let { energy } = nothingSeen();
+  for (let time = 0.016; time < 40; time += 0.1) energy = followEnergy(energy, "verlet", 0.005, time, time < 1 ? -16 * time : -16);
+  assert.ok(!done({ ...nothingSeen(), energy }));
 });
 
 test("bars that flip and grow differ from bars that decay", () => {
@@ -58,8 +70,10 @@ test("a time and its limit have the same unit", () => {
   assert.equal(ofLimit(5, 0), "5 ms, none known as stable");
 });
 
-test("a link names a step by number or by name", () => {
-  assert.deepEqual(["#step=4", "#step=method&links=2", "#step=0", "#step=11", "#step=x", "#links=2", ""].map(stepIn), [3, 3, -1, -1, -1, -1, -1]);
+test("a link names a step by its name, or by its number from before there was a step on PID", () => {
+  const titles = ["#step=4", "#step=method&links=2", "#step=2", "#step=3", "#step=pid", "#step=10"].map((link) => STEPS[stepIn(link)].id);
+  assert.deepEqual(titles, ["method", "method", "slow", "look", "pid", "own"]);
+  assert.deepEqual(["#step=0", "#step=11", "#step=x", "#links=2", ""].map(stepIn), [-1, -1, -1, -1, -1]);
 });
 
 // The scenes, held to the report's source

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { between, csvText, record, take } from "../../page/history.js";
-import { TIMESTEPS, cheapest, describeRun, distances, endOf, errorText, read, rungs, stamp, total, uncertaintyOf } from "../../page/ladder.js";
+import { cheapest, describeRun, distances, endOf, errorText, moveOf, read, rungs, stamp, timestepsFor, total, uncertaintyOf } from "../../page/ladder.js";
 import { nearestInReach } from "../../page/mechanics.js";
 import { LogScale } from "../../page/scale.js";
 import { DEFAULTS } from "../../page/settings.js";
@@ -52,11 +52,19 @@ test("a run is not judged by a reference that ended before it, and energy that o
 });
 
 test("all methods climb the same ladder, and the cheapest run that is good enough is found for each", () => {
-  assert.equal(rungs().length, 4 * TIMESTEPS.length);
-  assert.equal(rungs()[0].timestep, Math.max(...TIMESTEPS));
+  assert.equal(rungs().length, 4 * timestepsFor().length);
+  assert.equal(rungs()[0].timestep, 0.032);
   const rung = (method, error, wall) => ({ method, timestep: 1, error, wall, evaluations: 1, divergedAt: null });
   const best = cheapest([rung("euler", 1e-4, 9), rung("euler", 1e-3, 5), rung("rk4", 1e-2, 1), rung("rk4", 1e-6, 2), rung("verlet", null, 1)], 1e-3);
   assert.deepEqual(best.map(({ method, wall }) => [method, wall]), [["euler", 5], ["rk4", 2]]);
+});
+
+test("each timestep of a series divides the control period, so all runs have one controller", () => {
+  for (const period of [0.004, 0.0055, 0.01, 1 / 3]) {
+    for (const { timestep } of rungs(period)) {
+      assert.ok(Math.abs(period / timestep - Math.round(period / timestep)) < 1e-9 && timestep <= period, `${timestep} of ${period}`);
+    }
+  }
 });
 
 test("place and value of a logarithmic scale are each other's inverse", () => {
@@ -146,7 +154,9 @@ test("a closed loop has two errors, and a run that diverged has none", () => {
 });
 
 test("a measurement names its move and its settings", () => {
-  const { params, gains, period } = DEFAULTS[2];
-  assert.match(stamp({ links: 2, enabled: true, params, gains, period }, 2), /^Move to \(0\.9, −1\.3\) rad, 2 s from rest.*controller at every step, kp 1000, 250.*masses 1, 1 kg/);
-  assert.match(stamp({ links: 2, enabled: false, params, gains, period }, 2), /^Free swing, 2 s from rest, stretched out; masses 1, 1 kg/);
+  const { params, gains } = DEFAULTS[2];
+  const question = { params, gains, setpoint: [1, 2], control_period: 0, delay: false, q: [3, 4], qd: [5, 6], integrator: "rk4", timestep: 0.001 };
+  assert.match(stamp(moveOf({ ...question, control_period: 0.004, delay: true }), 2), /controller every 4 ms, delayed, kp/);
+  assert.match(stamp(moveOf(question), 2), /^Move to \(0\.9, −1\.3\) rad, 2 s from rest.*controller at every step, kp 1000, 250.*masses 1, 1 kg/);
+  assert.match(stamp(moveOf({ ...question, gains: { kp: [0, 0], ki: [0, 0], kd: [0, 0] } }), 2), /^Free swing, 2 s from rest, stretched out; masses 1, 1 kg/);
 });

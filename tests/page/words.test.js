@@ -1,10 +1,11 @@
 // Numbers as text, scales, settings in links, and the inverse of each.
 
 import assert from "node:assert/strict";
+import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
 
 import { duration, fixed, inPageNames, multipleOf, partOf, plain, short, significant } from "../../page/format.js";
-import { Rosbridge } from "../../page/rosbridge.js";
+import { Rosbridge, socketAddress } from "../../page/rosbridge.js";
 import { Axis, symmetricLog } from "../../page/scale.js";
 import { DEFAULTS, Undo, fromFragment, presentSettings, toFragment } from "../../page/settings.js";
 
@@ -66,7 +67,8 @@ test("a link may have fewer settings, the arm's start, and unknown names, which 
 });
 
 test("a wrong value in a link is kept, because the runtime refuses it", () => {
-  const { integrator, params, gains, period, controller, setpoint } = fromFragment("#method=leapfrog&gravity=&masses=1,&kp= &period=x&delay=maybe&controller=constructor&setpoint=");
+  const { integrator, params, gains, period, controller, setpoint } = fromFragment("#method=leapfrog&gravity=&masses=1,&kp= "
+    + "&period=x&delay=maybe&controller=constructor&setpoint=");
   assert.deepEqual([integrator, params, gains], [{ method: "leapfrog" }, { gravity: NaN, masses: [1, NaN] }, { kp: [NaN] }]);
   assert.deepEqual([period, controller, setpoint], [{ period: NaN, delay: "maybe" }, "constructor", [NaN]]);
 });
@@ -107,7 +109,8 @@ test("a refusal keeps the runtime's names until it is shown", async () => {
 test("a refusal has the names of the page's fields", () => {
   const shown = {
     "kp[0] must be a number, got null; kp[1] must be a number, got null": "kp 1 must be a number; kp 2 must be a number",
-    "epsilon must be greater than 0, got -1; success_hold must be at least 0, got -1": "tolerance must be greater than 0, got -1; hold must be at least 0, got -1",
+    "epsilon must be greater than 0, got -1; success_hold must be at least 0, got -1":
+      "tolerance must be greater than 0, got -1; hold must be at least 0, got -1",
     "phi = 2 puts the wrist 3.4 m from the base": "orientation = 2 puts the wrist 3.4 m from the base",
     "effort[0] must be a number, got null": "torque 1 must be a number",
     "effort must have 2 entries, got 1": "torque must have 2 entries, got 1",
@@ -116,6 +119,14 @@ test("a refusal has the names of the page's fields", () => {
     "masses must have 2 entries, got 1": "masses must have 2 entries, got 1",
   };
   for (const [status, text] of Object.entries(shown)) assert.equal(inPageNames(status), text);
+});
+
+test("the WebSocket is in the folder of the page, also behind a proxy", () => {
+  const pages = {
+    "http://127.0.0.1:9095/": "ws://127.0.0.1:9095/", "https://host/arm1/": "wss://host/arm1/",
+      "https://host/arm1/index.html?links=2#step=own": "wss://host/arm1/",
+  };
+  for (const [page, socket] of Object.entries(pages)) assert.equal(socketAddress(page), socket);
 });
 
 test("a request with a number that is not finite is refused, because null can mean the default", async () => {
@@ -129,4 +140,26 @@ test("a request with a number that is not finite is refused, because null can me
   assert.equal(sent.length, 1, "the runtime names the entries of a list");
   bridge.answer("page-1", { result: true });
   assert.ok((await call).result);
+});
+
+test("each link of the worksheets sets everything", () => {
+  const text = readFileSync(new URL("../../course/worksheets.md", import.meta.url), "utf8");
+  const links = [...text.matchAll(/\(\.\.\/pendularm\.html(#[^)]*)\)/g)].map(([, hash]) => hash);
+  assert.equal(links.length, 6);
+  for (const link of links) {
+    const settings = fromFragment(link);
+    for (const [key, wanted] of Object.entries(DEFAULTS[2])) {
+      assert.deepEqual(Object.keys(settings[key] ?? {}).sort(), Object.keys(wanted ?? {}).sort(), `${key} in ${link}`);
+    }
+    assert.deepEqual([settings.start.position.length, settings.start.velocity.length], [2, 2]);
+  }
+});
+
+test("no line of the page and its tests is longer than 160 characters", () => {
+  for (const folder of ["../../page/", "../page/", "../browser/"].map((path) => new URL(path, import.meta.url))) {
+    for (const name of readdirSync(folder).filter((one) => /\.(js|mjs|html|css|svg|py)$/.test(one))) {
+      const long = readFileSync(new URL(name, folder), "utf8").split("\n").findIndex((line) => [...line].length > 160);
+      assert.equal(long, -1, `${name}: line ${long + 1}`);
+    }
+  }
 });

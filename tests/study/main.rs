@@ -22,6 +22,8 @@ mod fewest;
 #[cfg(feature = "report")]
 #[path = "../support/folder.rs"]
 mod folder;
+mod friction;
+mod held_loop;
 mod matrix;
 mod motion;
 mod planner;

@@ -10,7 +10,11 @@ from importlib.metadata import version as _version
 
 from . import dynamics
 from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
+from .held import HeldLimit, HeldMode, held_limit
+from ._page import Page, page
+from ._ray import RayExecutor
 from .report import read_report
+from .scores import score, submission
 from .study import Critical, Plan, Rollout, Stability, SuggestedGains, plan, rollout, stability, suggest_gains
 from .sweep import Run, Sweep, sweep
 
@@ -21,7 +25,11 @@ __all__ = [
     "Batch",
     "Critical",
     "Divergence",
+    "HeldLimit",
+    "HeldMode",
+    "Page",
     "Plan",
+    "RayExecutor",
     "Rollout",
     "Run",
     "Simulation",
@@ -31,11 +39,15 @@ __all__ = [
     "default_gains",
     "dynamics",
     "end_effector",
+    "held_limit",
     "inverse_kinematics",
+    "page",
     "plan",
     "read_report",
     "rollout",
+    "score",
     "stability",
+    "submission",
     "suggest_gains",
     "sweep",
 ]

@@ -1,4 +1,7 @@
-"""``python -m pendularm``: the live runtime, with its own command line."""
+"""``python -m pendularm``: the live runtime, with its own command line.
+
+``python -m pendularm page`` opens the page in one file in a browser instead, ``page 4`` its fourth step.
+"""
 
 import os
 import sys
@@ -23,6 +26,11 @@ def program() -> Path:
 
 def main() -> None:
     """Replaces this process by the program, so signals and the exit status are those of the program."""
+    if sys.argv[1:2] == ["page"]:
+        from ._page import page
+
+        print(page(*sys.argv[2:3]).open())
+        return
     path = str(program())
     os.execv(path, [path, *sys.argv[1:]])
 

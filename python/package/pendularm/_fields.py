@@ -2,16 +2,61 @@
 
 import operator
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._native import as_doubles, is_masked, is_too_long
+from ._native import PromisedFloats, as_doubles, is_masked, is_too_long
 
 Floats = NDArray[np.float64]
+
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def promised(function: Callable[P, T]) -> Callable[P, T]:
+    """The function in the floating-point environment of the results, for example without flush-to-zero."""
+
+    @wraps(function)
+    def inside(*args: P.args, **kwargs: P.kwargs) -> T:
+        with PromisedFloats():
+            return function(*args, **kwargs)
+
+    return inside
+
+
+class Arrays(Mapping[str, NDArray[Any]]):
+    """Arrays by name: a mapping that is read-only, and equal only to itself."""
+
+    def __init__(self, found: Mapping[str, NDArray[Any]]) -> None:
+        self._found = dict(found)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self._found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return id(self)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._found})"
+
+
+class Gains(Arrays):
+    """The gains `kp` [N m/rad], `ki` [N m/(rad s)] and `kd` [N m s/rad], (links,) each."""
 
 
 def shown(value: Any) -> str:

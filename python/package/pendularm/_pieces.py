@@ -9,10 +9,12 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import AbstractContextManager, nullcontext, suppress
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ._native import BUILD
 
 PieceResults = dict[str, NDArray[Any]]
 """The results of a piece by the metrics' names, each (arms,)."""
@@ -27,13 +29,13 @@ def hand_out(
     starts: Sequence[int],
     piece: int,
     executor: Any,
-    solve: Callable[..., PieceResults],
+    solve: Callable[..., tuple[str, PieceResults]],
     done: dict[int, PieceResults],
     kept: "Folder | None",
     progress: bool,
 ) -> None:
     """Submits the pieces that begin at `starts`, each a `solve` of the sweep over a range of settings, and collects
-    each result on arrival."""
+    each result on arrival. A worker with another wheel is refused."""
     left = iter(starts)
     under_way: dict[Future[Any], int] = {}
     already = total - sum(min(piece, total - start) for start in starts)
@@ -48,7 +50,7 @@ def hand_out(
                 # Failed ones come last, so all finished ones are kept.
                 for future in sorted(ended, key=lambda one: one.cancelled() or one.exception() is not None):
                     start = under_way.pop(future)
-                    done[start] = future.result()
+                    done[start] = _of_this_wheel(future.result())
                     if kept is not None:
                         kept.keep(start, done[start])
                     if bar is not None:
@@ -56,6 +58,14 @@ def hand_out(
         finally:
             for future in under_way:
                 future.cancel()
+
+
+def _of_this_wheel(answer: Any) -> PieceResults:
+    """The results of a piece, if the worker has the same wheel. An old one returns the results alone."""
+    build, values = answer if isinstance(answer, tuple) else ("of an older version", None)
+    if build != BUILD:
+        raise ValueError(f"a worker has another wheel of pendularm ({build}) than this process ({BUILD})")
+    return cast(PieceResults, values)
 
 
 def _in_notebook() -> bool:
@@ -120,7 +130,7 @@ class Folder:
         if not file.exists():
             if pieces:
                 raise ValueError(f"folder {path} holds pieces of a sweep without their sweep.json")
-            self._write("sweep.json", lambda part: part.write_text(json.dumps(told)), _publish)
+            self._write("sweep.json", lambda part: part.write_text(json.dumps(told), encoding="utf-8"), _publish)
         # The file is read even if it was just written, because another sweep may have written it
         # first.
         try:

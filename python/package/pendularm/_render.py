@@ -61,6 +61,10 @@ class Renderer:
         self.trail = np.full((TRAIL if mode else 0, self.shown, 2), np.nan)
         self.updates = 0
 
+    def __getstate__(self) -> dict[str, Any]:
+        # A window and its surfaces cannot be copied.
+        return {**self.__dict__, "canvas": None, "clock": None}
+
     def update(self, begun: NDArray[np.bool_]) -> None:
         """Adds the present positions to the trails and updates the window. Arms with a new episode start a new
         trail."""

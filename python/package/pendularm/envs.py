@@ -4,13 +4,16 @@ arms ``gymnasium.make_vec("Pendularm-v0", num_envs=1024)``; `PendularmReach-v0` 
 The vector environments use a `Batch`. Each of their arms is bit-identical to the single environment, and has its own
 random stream. Under the seed `s`, arm `i` is the single environment under `s + i`, for any number of arms. They
 truncate episodes themselves. An arm is reset in the call after its end, and its action in that call is ignored
-(`AutoresetMode.NEXT_STEP`). All returned arrays are fresh. An environment can be neither deeply copied nor pickled,
-and a process that is forked while another thread steps it must not use it.
+(`AutoresetMode.NEXT_STEP`), unless another `autoreset_mode` is given. All returned arrays are fresh. A copied or
+unpickled environment goes on with the same bits. A process that is forked while another thread steps an environment
+must not use it.
 """
 
+import pickle
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from copy import deepcopy
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import gymnasium
 import numpy as np
@@ -20,7 +23,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ._fields import Floats, as_array, read_seeds, shown, whole_number
+from ._fields import Floats, as_array, promised, read_seeds, shown, whole_number
 from ._native import is_masked
 from ._render import METADATA, Frame, Renderer
 from ._tasks import TIMESTEP, Action, Observation, Reach, SwingUp, Task
@@ -30,7 +33,14 @@ __all__ = [
     "PendularmReachEnv",
     "PendularmReachVectorEnv",
     "PendularmVectorEnv",
+    "sb3",
 ]
+
+if TYPE_CHECKING:
+    from .sb3 import Sb3VecEnv
+
+
+T = TypeVar("T")
 
 
 def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
@@ -38,7 +48,7 @@ def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
     if is_masked(actions):
         raise ValueError(f"{name} must have no masked numbers, got {shown(actions)}")
     array = as_array(name, actions)
-    if array.shape != space.shape or array.dtype.kind not in "biuf":
+    if array.shape != space.shape or array.dtype.kind not in "iuf":
         raise ValueError(f"{name} must have the shape {space.shape}, of numbers, got {array.shape} of {array.dtype}")
     return array
 
@@ -53,10 +63,37 @@ def _need_reset(call: str, has_begun: bool) -> None:
         raise gymnasium.error.ResetNeeded(f"{call} needs a reset before it, and another one after close")
 
 
-class _Single(gymnasium.Env[Observation, Action]):
+class _States:
+    """Copies of an environment, and its state as bytes."""
+
+    def __copy__(self: T) -> T:
+        # A shallow copy would share the arms.
+        return deepcopy(self)
+
+    def get_state(self) -> bytes:
+        """The state as bytes, for `set_state`: arms, episodes and random streams. Wrappers have their own."""
+        kept = {name: value for name, value in vars(self).items() if name.startswith("_") and name != "_picture"}
+        return pickle.dumps((type(self).__name__, kept))
+
+    def set_state(self, state: bytes) -> None:
+        """Continues from the state of an environment of this kind, with as many arms and links.
+
+        The bytes are a pickle, which can run any code: use only those that you trust.
+        """
+        kind, kept = pickle.loads(state)
+        ours, theirs = vars(self)["_task"], kept["_task"]
+        if kind != type(self).__name__ or (theirs.batch.n_arms, theirs.links) != (ours.batch.n_arms, ours.links):
+            arms = f"{theirs.batch.n_arms} arms of {theirs.links} links"
+            raise ValueError(f"state must be of the same kind of environment, got a {kind} of {arms}")
+        vars(self).update(kept)
+        vars(self)["_picture"].task = theirs
+
+
+class _Single(_States, gymnasium.Env[Observation, Action]):
     metadata: dict[str, Any] = METADATA  # noqa: RUF012
     task_of: ClassVar[type[Task]]
 
+    @promised
     def __init__(
         self,
         links: int = 2,
@@ -71,6 +108,7 @@ class _Single(gymnasium.Env[Observation, Action]):
         self.observation_space = self._task.observation_space
         self.action_space = self._task.action_space
 
+    @promised
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -80,6 +118,7 @@ class _Single(gymnasium.Env[Observation, Action]):
         self._picture.update(np.ones(1, np.bool_))
         return self._task.observe()[0], {}
 
+    @promised
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         _need_reset("step", self._has_begun)
         action = _checked("action", action, self.action_space)
@@ -97,13 +136,16 @@ class _Single(gymnasium.Env[Observation, Action]):
 
     def close(self) -> None:
         self._has_begun = False
-        self._picture.close()
+        # Gymnasium 1.1 and 1.2 close also an environment whose arguments were refused.
+        if hasattr(self, "_picture"):
+            self._picture.close()
 
 
-class _Vector(VectorEnv[Observation, Action, Any]):
+class _Vector(_States, VectorEnv[Observation, Action, Any]):
     metadata: dict[str, Any] = {**METADATA, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
     task_of: ClassVar[type[Task]]
 
+    @promised
     def __init__(
         self,
         num_envs: int = 1,
@@ -113,6 +155,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         method: str = "rk4",
         timestep: float = TIMESTEP,
         render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     ) -> None:
         if max_episode_steps is None:
             max_episode_steps = self.task_of.most_steps
@@ -125,6 +168,12 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             raise _named(refusal, "n_arms", "num_envs") from None
         # The largest number means no limit in practice.
         self._most_steps = sys.maxsize if most_steps == -1 else min(most_steps, sys.maxsize)
+        try:
+            self._mode = AutoresetMode(autoreset_mode)
+        except ValueError:
+            modes = ", ".join(mode.value for mode in AutoresetMode)
+            raise ValueError(f"autoreset_mode must be one of {modes}, got {shown(autoreset_mode)}") from None
+        self.metadata = {**self.metadata, "autoreset_mode": self._mode}
         self._picture = Renderer(render_mode, self._task)
         self.num_envs = num_envs
         self.render_mode = render_mode
@@ -153,6 +202,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             self._streams = [seeding.np_random() for _ in range(self.num_envs)]
         return self._streams
 
+    @promised
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -181,12 +231,16 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self._picture.update(mask)
         return self._task.observe(), {}
 
+    @promised
     def step(
         self, actions: Action
     ) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         _need_reset("step", self._has_begun)
         # Ended arms are stepped with the others without effort, and are then reset.
         again = self._ended
+        if self._mode == AutoresetMode.DISABLED and again.any():
+            arms = np.flatnonzero(again).tolist()
+            raise gymnasium.error.ResetNeeded(f"step needs a reset of the ended arms {arms} before it (reset_mask)")
         actions = np.where(again[:, None], 0, _checked("actions", actions, self.action_space))
         try:
             self._task.go_on(actions)
@@ -200,8 +254,16 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             lost[again] = False
         truncated = self._elapsed >= self._most_steps
         self._ended = lost | truncated
+        if self._mode != AutoresetMode.SAME_STEP or not self._ended.any():
+            self._picture.update(again)
+            return self._task.observe(), rewards, lost, truncated, {}
+        again, last = self._ended, np.full(self.num_envs, None, object)
+        for arm, observation in enumerate(self._task.observe()):
+            last[arm] = observation if again[arm] else None
+        self._begin(again)
         self._picture.update(again)
-        return self._task.observe(), rewards, lost, truncated, {}
+        infos = {"final_obs": last, "_final_obs": again, "final_info": {}, "_final_info": again.copy()}
+        return self._task.observe(), rewards, lost, truncated, infos
 
     def render(self) -> tuple[Frame, ...] | None:
         """A frame for each arm."""
@@ -210,7 +272,9 @@ class _Vector(VectorEnv[Observation, Action, Any]):
 
     def close_extras(self, **kwargs: Any) -> None:
         self._has_begun = False
-        self._picture.close()
+        # Gymnasium 1.1 and 1.2 close also an environment whose arguments were refused.
+        if hasattr(self, "_picture"):
+            self._picture.close()
 
     def _begin(self, mask: NDArray[np.bool_]) -> None:
         arms = np.flatnonzero(mask).tolist()
@@ -219,12 +283,27 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self._ended = self._ended & ~mask
 
 
+def sb3(name: str, num_envs: int, **kwargs: Any) -> "Sb3VecEnv":
+    """The environment `name` with `num_envs` arms as a `VecEnv` of stable-baselines3, which needs this package.
+
+    `kwargs` are those of the vector environment, such as `links`, `threads` or `render_mode`.
+    """
+    from .sb3 import Sb3VecEnv
+
+    return Sb3VecEnv(name, num_envs, **kwargs)
+
+
 def _arguments_and_rendering(target: str) -> str:
     """The end of both tasks' documentation. `target` names the drawn target."""
     return f"""## Arguments
     `links`, 2 or 3. `method`, one of euler, midpoint, verlet and rk4, and its `timestep` in s, 0.05 s divided by a
     whole number: by default rk4 with 0.005 s. `render_mode`, None, human or rgb_array. The vector environment also has
-    `threads`, as `Batch` does, and `max_episode_steps`, -1 for no limit.
+    `threads`, as `Batch` does, `max_episode_steps`, -1 for no limit, and `autoreset_mode`, a
+    `gymnasium.vector.AutoresetMode` or its value.
+
+    ## Reset
+    `seed` seeds the random stream. The vector environment takes `options={{"reset_mask": mask}}`, (num_envs,) of bool,
+    which resets only these arms. There are no other options.
 
     ## Rendering
     Drawn are the arm, the target (here that is {target}) and the last 2 s of the end effector's path. A frame is

@@ -173,7 +173,7 @@ def stability(
     arm: Arm | None = None,
     *,
     integrator: str = "rk4",
-    gains: Mapping[str, ArrayLike] | None = None,
+    gains: Mapping[str, ArrayLike | None] | SuggestedGains | None = None,
     setpoint: ArrayLike | None = None,
     q: ArrayLike | None = None,
     qd: ArrayLike | None = None,
@@ -181,7 +181,8 @@ def stability(
 ) -> Stability:
     """Predicts the largest timestep at which a control loop is stable, as ``/study/stability`` does.
 
-    `gains` are `kp`, `ki` and `kd`, (links,) each. Missing ones are the default gains, and zeros examine a free arm.
+    `gains` are `kp`, `ki` and `kd`, (links,) each, or suggested gains. Missing ones are the default gains, and zeros
+    examine a free arm.
     `setpoint` [rad] is the starting pose by default. `q` [rad] and `qd` [rad/s] are the state at the start of the
     coming motion. The law runs once per `control_period` [s], 0 for every step.
     """
@@ -198,7 +199,7 @@ def rollout(
     duration: float = 10.0,
     timestep: float = 0.001,
     integrator: str = "rk4",
-    gains: Mapping[str, ArrayLike] | None = None,
+    gains: Mapping[str, ArrayLike | None] | SuggestedGains | None = None,
     setpoint: ArrayLike | None = None,
     samples: int = 1001,
     reference: bool | np.bool_ = False,
@@ -208,7 +209,7 @@ def rollout(
 
     It begins at `q0` [rad] and `qdot0` [rad/s] (zeros by default). `duration` [s], at least one timestep, is rounded
     to the nearest number of timesteps. The result has `samples`, including start and end, or every step if there are
-    fewer. Without `gains` the arm is free, and a `setpoint` is refused. A missing member of `gains` is zeros. With
+    fewer. Without `gains` the arm is free, and a `setpoint` is refused. With
     `reference` the run is compared with the true motion under the same held control law, and with the loop whose law
     acts at every instant. The law runs once per `control_period` [s], 0 for every step.
     """
@@ -222,7 +223,7 @@ def plan(
     duration: float | None = None,
     q0: ArrayLike | None = None,
     qdot0: ArrayLike | None = None,
-    gains: Mapping[str, ArrayLike] | None = None,
+    gains: Mapping[str, ArrayLike | None] | SuggestedGains | None = None,
     setpoint: ArrayLike | None = None,
     control_period: float = 0.0,
 ) -> Plan:
@@ -231,7 +232,7 @@ def plan(
 
     Without `gains` the arm is free for `duration` [s] (10 by default) from `q0` [rad] and `qdot0` [rad/s], and a
     `setpoint` is refused. With `gains` it moves to `setpoint` [rad] (4 s by default), and holding the effort counts
-    as error, unless the `control_period` [s] is given. A missing member of `gains` is zeros. Raises `ValueError` if
+    as error, unless the `control_period` [s] is given. Raises `ValueError` if
     the motion cannot be known that well for that long.
     """
     return Plan(**_native.plan(locals()))

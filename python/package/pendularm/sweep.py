@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._code import fingerprint
-from ._fields import Floats, as_array, flag, number, path, shown, whole_number
-from ._native import Batch, is_masked
+from ._fields import Arrays, Floats, as_array, flag, number, path, promised, shown, whole_number
+from ._native import BUILD, Batch, is_masked
 from ._pieces import Folder, PieceResults, hand_out
 from ._settings import begin, column, try_values
 
@@ -83,16 +83,13 @@ class Executor(Protocol):
     def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]: ...
 
 
-@dataclass(frozen=True, eq=False)
-class Sweep:
-    """The results, with an axis for each name of the grid, in its order."""
+class Sweep(Arrays):
+    """The results: a mapping from the metrics' names to arrays with the shape of the grid."""
 
-    grid: dict[str, list[Any]]
-    values: dict[str, NDArray[Any]]
-    """By the metrics' names, each with the shape of the grid."""
-
-    def __getitem__(self, metric: str) -> NDArray[Any]:
-        return self.values[metric]
+    def __init__(self, grid: dict[str, list[Any]], found: Mapping[str, NDArray[Any]]) -> None:
+        super().__init__(found)
+        self.grid = grid
+        """The values of each axis by the names of the grid, in its order."""
 
 
 def final_error(run: Run) -> Floats:
@@ -316,8 +313,16 @@ def _advance(batch: Batch, steps: NDArray[np.int64], stopped: threading.Event | 
             return
 
 
-def _solve(question: _Question, start: int, stop: int, stopped: threading.Event | None = None) -> PieceResults:
-    """Computes one piece on any worker. In this process it ends soon after `stopped` is set."""
+@promised
+def _solve(
+    question: _Question, start: int, stop: int, stopped: threading.Event | None = None
+) -> tuple[str, PieceResults]:
+    """Computes one piece on any worker, and names the worker's wheel. In this process it ends soon after `stopped` is
+    set."""
+    return BUILD, _values(question, start, stop, stopped)
+
+
+def _values(question: _Question, start: int, stop: int, stopped: threading.Event | None) -> PieceResults:
     places = np.unravel_index(np.arange(start, stop), question.shape)
     arms = stop - start
     settings = {name: values[place] for (name, values), place in zip(question.axes.items(), places, strict=True)}

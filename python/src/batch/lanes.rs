@@ -14,6 +14,7 @@ use pendularm::math::simulation::{Simulation, batch};
 
 use super::given::of_arm;
 use crate::arrays::{Rows, collected};
+use crate::floats::Promised;
 
 /// Fewest lane-steps per additional thread: some tens of microseconds.
 const WORTH_A_THREAD: u64 = 3000;
@@ -107,6 +108,8 @@ pub(crate) fn advance<const N: usize>(
 impl Piece<'_> {
     /// Takes it with the lanes of this slice.
     fn take<const N: usize>(&self, first: usize, lanes: &mut [Simulation<N>], shown: Shown<'_>) {
+        // This may be a thread of the pool.
+        let _floats = Promised::begin();
         if self.done == 0
             && let Some(effort) = self.effort
         {

@@ -19,12 +19,14 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::{ControlPeriod, Simulation};
-use pyo3::prelude::{Py, PyAny, PyResult, Python, pyclass, pymethods};
+use pyo3::prelude::{Py, PyAny, PyDictMethods, PyResult, Python, pyclass, pymethods};
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::arm::{Either, for_either};
 use crate::arrays::{ArrayArgument, Rows, read_only};
 use crate::fields::{self, Bound, Flag, Held, Object, Whole, refused};
 use crate::patience::{Turns, hold};
+use crate::state;
 use given::{chosen, of_arm, read, read_flags, read_methods, read_steps};
 use lanes::Piece;
 use pool::pool;
@@ -43,11 +45,11 @@ const MOST_THREADS: usize = 1024;
 ///
 /// All start as in a fresh runtime. `position`, `velocity`, `effort`, `time` and `diverged` are read-only arrays,
 /// created once and overwritten by every call that changes the arms. Copy values that you need later. An array
-/// argument has one row per arm, (`n_arms`, links), or one for all, (links,). Contiguous, writable doubles are read
+/// argument has one row per arm, (`n_arms`, links), or one for all, (links,) or (1, links). Contiguous, writable doubles are read
 /// without a copy. `threads` share the work: by default one per core, or fewer if the system refuses some. With 1 the
 /// caller's thread does the work. Calls that change one batch from several threads wait for each other. The arrays
-/// can be read meanwhile, and show the present state of each arm. A batch cannot be copied or pickled. A
-/// process that is forked while another thread steps the batch must not use it.
+/// can be read meanwhile, and show the present state of each arm. A copied or
+/// unpickled batch takes the same steps, bit for bit. A process that is forked while another thread steps the batch must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Batch {
@@ -184,7 +186,8 @@ impl Batch {
     }
 
     /// Sets the states of arms: `position` [rad] and `velocity` [rad/s] (zeros by default), one row per arm or one
-    /// for all. `arms` selects them as in `reset`. Clocks and controllers do not change.
+    /// for all. `arms` selects them as in `reset`. Clocks and controllers do not change. With the bytes of `get_state`
+    /// in place of the position, everything of all arms is set.
     #[pyo3(signature = (position, velocity=None, arms=None))]
     fn set_state(
         &self,
@@ -193,6 +196,19 @@ impl Batch {
         velocity: Option<&Object<'_>>,
         arms: Option<&Object<'_>>,
     ) -> PyResult<()> {
+        if let Ok(state) = position.cast::<PyBytes>() {
+            let further = velocity.or(arms);
+            let _turn = self.turns.take(py)?;
+            return for_either!(&self.own, lanes => {
+                let read = state::read(state, self.arms, further)?;
+                let mut lanes = hold(py, lanes);
+                let lanes = &mut *lanes;
+                self.windows.write(py, |shown| {
+                    *lanes = read;
+                    shown.show(lanes);
+                })
+            });
+        }
         let chosen = chosen(arms, self.arms)?;
         let position = ArrayArgument::read("position", position)?;
         let position = position.rows(Some(chosen.len()), self.links(), Bound::Finite)?;
@@ -211,6 +227,28 @@ impl Batch {
                 }
             }
         })
+    }
+
+    /// The whole state of all arms as bytes, for `set_state` of a batch with as many arms and links.
+    fn get_state<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyBytes>> {
+        for_either!(&self.own, lanes => state::written(py, &hold(py, lanes)))
+    }
+
+    fn __getnewargs_ex__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<((usize, usize), Held<'py, PyDict>)> {
+        let given = PyDict::new(py);
+        given.set_item("threads", self.threads)?;
+        Ok(((self.arms, self.links()), given))
+    }
+
+    fn __getstate__<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyBytes>> {
+        self.get_state(py)
+    }
+
+    fn __setstate__(&self, py: Python<'_>, state: &Object<'_>) -> PyResult<()> {
+        self.set_state(py, state, None, None)
     }
 
     /// Sets the setpoints: `positions` [rad] and `velocities` [rad/s] (zeros by default).

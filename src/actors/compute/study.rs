@@ -18,8 +18,8 @@ use crate::actors::node::{Call, Nodes, Reply, Unserved};
 use crate::protocol::catalog::Service;
 use crate::services::study::{Computed, Integrating, Work};
 pub use crate::services::study::{
-    IntegrationStep, PlanRun, PlannedRun, PredictStability, Predicted, Ran, Refused, RunOffline,
-    SuggestGains, Suggested,
+    FindHeldLimit, IntegrationStep, PlanRun, PlannedRun, PredictStability, Predicted, Ran, Refused,
+    RunOffline, SuggestGains, Suggested,
 };
 use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
@@ -42,6 +42,7 @@ impl<const N: usize> Study<N> {
     /// Enters this node's services into the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<PredictStability<N>>(Service::Stability, address.clone());
+        nodes.serve::<FindHeldLimit>(Service::HeldLimit, address.clone());
         nodes.serve::<RunOffline<N>>(Service::Rollout, address.clone());
         nodes.serve::<SuggestGains<N>>(Service::SuggestGains, address.clone());
         nodes.serve::<PlanRun<N>>(Service::Plan, address.clone());

@@ -192,6 +192,39 @@ pub fn energy<const N: usize>(arm: &Arm<N>, state: &State<N>) -> f64 {
     kinetic_energy(arm, &state.position, &state.velocity) + potential_energy(arm, &state.position)
 }
 
+/// Efforts less those of viscous friction \[N m\]: `τ - b q̇`, at the rates `qd` \[rad/s\].
+#[must_use]
+#[inline(always)]
+pub fn less_friction<T: Arithmetic, const N: usize>(
+    viscous: &[T; N],
+    qd: &[T; N],
+    tau: &[T; N],
+) -> [T; N] {
+    std::array::from_fn(|i| tau[i] - viscous[i] * qd[i])
+}
+
+/// The energy that friction takes in a step of `h` \[s\] from one state to another \[J\]: the integral of `b q̇²`.
+///
+/// The rate within the step is the parabola with the rates at both ends and the angle turned between. So the error of a
+/// step is of the fifth order in `h`, like that of Runge-Kutta 4.
+#[must_use]
+pub fn friction_loss<const N: usize>(
+    arm: &Arm<N>,
+    before: &State<N>,
+    after: &State<N>,
+    h: f64,
+) -> f64 {
+    let of_joint = |i: usize| {
+        let (v0, v1) = (before.velocity[i], after.velocity[i]);
+        let mean = (after.position[i] - before.position[i]) / h;
+        // The rate is v0 + (v1 - v0) s + bow s (1 - s).
+        let bow = 6.0 * mean - 3.0 * (v0 + v1);
+        let square = (v0 * v0 + v0 * v1 + v1 * v1) / 3.0 + bow * (v0 + v1) / 6.0 + bow * bow / 30.0;
+        arm.viscous()[i] * square * h
+    };
+    (0..N).map(of_joint).sum()
+}
+
 /// `μ_ij l_i l_j` \[kg m²\].
 pub(crate) fn coupling<const N: usize>(arm: &Arm<N>, i: usize, j: usize) -> f64 {
     let outer = i.max(j);

@@ -6,6 +6,7 @@ use super::hold::{Held, Hold};
 use super::{Disturbance, Divergence, Simulation};
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
+use crate::math::limits::Limits;
 use crate::math::pid::{Gains, Pid, Setpoint};
 
 /// The whole state of a simulation between two steps.
@@ -23,6 +24,8 @@ pub struct Checkpoint<const N: usize> {
     pub enabled: bool,
     /// When the control law runs, and the held efforts.
     pub held: Held<N>,
+    /// The limits of the motors, and the anti-windup.
+    pub limits: Limits<N>,
     /// The method that takes the steps.
     pub method: Method,
     /// Length of a step \[s\], greater than 0.
@@ -56,6 +59,7 @@ impl<const N: usize> Simulation<N> {
             integral: *self.pid.integral(),
             enabled: self.pid.is_enabled(),
             held: self.hold.held,
+            limits: self.hold.limits,
             method: self.method,
             timestep: self.timestep,
             state: self.state,
@@ -79,7 +83,7 @@ impl<const N: usize> Simulation<N> {
         Self {
             arm: from.arm,
             pid,
-            hold: Hold::new(from.held, from.timestep),
+            hold: Hold::new(from.held, from.limits, from.timestep),
             method: from.method,
             timestep: from.timestep,
             state: from.state,

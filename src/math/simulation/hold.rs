@@ -6,10 +6,13 @@
 //! its result is applied one period later, as if the computation took a whole period (Åström and Wittenmark,
 //! Computer-Controlled Systems, 3rd ed., section 1.3).
 //!
-//! **Invariant:** with a period of one step and no delay the law runs in every step, with the timestep as its `dt`.
+//! Limits of the motors bound the effort when it is applied, so a new limit also bounds an effort that is already held.
+//!
+//! **Invariant:** with a period of one step, no delay and no limits the law runs in every step, with the timestep as its `dt`.
 
 use crate::math::arm::State;
 use crate::math::count::{in_f64, whole};
+use crate::math::limits::Limits;
 use crate::math::pid::{Control, Pid};
 
 /// Most steps of a control period. Whole numbers up to it are exact as `f64`, and this number of steps takes years.
@@ -73,18 +76,20 @@ impl<const N: usize> Default for Held<N> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hold<const N: usize> {
     pub(in crate::math) held: Held<N>,
+    /// What the motors can apply. It holds for every effort here.
+    pub(in crate::math) limits: Limits<N>,
     /// Steps per period.
     steps: u64,
     /// Duration of a period \[s\].
     length: f64,
-    /// Whether the law, if it is on, runs in every step without delay, and no other effort replaces it.
+    /// Whether the law, if it is on, runs in every step without delay and limits, and no other effort replaces it.
     pub(in crate::math) every_step: bool,
 }
 
 impl<const N: usize> Hold<N> {
     /// The held effort, in steps of `timestep` \[s\].
     #[must_use]
-    pub fn new(held: Held<N>, timestep: f64) -> Self {
+    pub fn new(held: Held<N>, limits: Limits<N>, timestep: f64) -> Self {
         let steps = held.period.steps(timestep);
         Self {
             steps,
@@ -92,8 +97,10 @@ impl<const N: usize> Hold<N> {
             every_step: steps == 1
                 && !held.period.delay
                 && held.driven.is_none()
+                && limits.are_absent()
                 && held.command.iter().all(|effort| effort.to_bits() == 0),
             held,
+            limits,
         }
     }
 
@@ -102,7 +109,12 @@ impl<const N: usize> Hold<N> {
         let mut held = self.held;
         held.due = 0;
         change(&mut held);
-        *self = Self::new(held, timestep);
+        *self = Self::new(held, self.limits, timestep);
+    }
+
+    /// Changes the limits from the next step on, within the period.
+    pub(super) fn set_limits(&mut self, limits: Limits<N>, timestep: f64) {
+        *self = Self::new(self.held, limits, timestep);
     }
 
     /// Sets the clients' effort \[N m\].
@@ -112,6 +124,7 @@ impl<const N: usize> Hold<N> {
                 command,
                 ..self.held
             },
+            self.limits,
             timestep,
         );
     }
@@ -136,7 +149,7 @@ impl<const N: usize> Hold<N> {
             None if !pid.is_enabled() => held.command,
             None => {
                 if held.due == 0 {
-                    let control = pid.control(state, self.length);
+                    let control = self.limits.control(pid, state, self.length);
                     held.effort = if held.period.delay {
                         std::mem::replace(&mut held.computed, control.effort)
                     } else {
@@ -149,7 +162,19 @@ impl<const N: usize> Hold<N> {
                 held.effort
             }
         };
+        let effort = self.limits.applied(effort);
         (Control { effort, integral }, held)
+    }
+
+    /// The joints whose motor was at its limit in the latest step.
+    pub(super) fn at_limit(&self, is_enabled: bool) -> [bool; N] {
+        let held = &self.held;
+        let demanded = match held.driven {
+            Some(effort) => effort,
+            None if is_enabled => held.effort,
+            None => held.command,
+        };
+        self.limits.reached(&demanded)
     }
 
     /// Commits a step: its effort is held from now on.

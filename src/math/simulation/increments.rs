@@ -8,7 +8,7 @@
 )]
 
 use crate::math::arm::{Arm, State};
-use crate::math::dynamics::{forward_dynamics, weightless_dynamics};
+use crate::math::dynamics::{forward_dynamics, less_friction, weightless_dynamics};
 use crate::math::integrator::{Increment, Method, increment, two_sum};
 use crate::math::number::Number;
 
@@ -61,7 +61,9 @@ fn acceleration<const N: usize>(
     v: &[f64; N],
     effort: &[f64; N],
 ) -> [f64; N] {
-    if leaves_out_first_angle(arm) {
+    if arm.has_friction() {
+        forward_dynamics(arm, q, v, &less_friction(arm.viscous(), v, effort))
+    } else if leaves_out_first_angle(arm) {
         weightless_dynamics(arm, q, v, effort)
     } else {
         forward_dynamics(arm, q, v, effort)

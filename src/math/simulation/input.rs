@@ -5,6 +5,7 @@
 use super::{Checkpoint, ControlPeriod, Simulation};
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
+use crate::math::limits::Limits;
 use crate::math::pid::{Gains, Setpoint};
 
 /// An external change, effective from the next step on.
@@ -31,6 +32,8 @@ pub enum ArmInput<const N: usize> {
     },
     /// The control period.
     Period(ControlPeriod),
+    /// The limits of the motors, and the anti-windup.
+    Limits(Limits<N>),
     /// Positions and velocities of the joints.
     State(State<N>),
     /// An effort that is applied while the controller is off \[N m\].
@@ -64,6 +67,7 @@ impl<const N: usize> Simulation<N> {
             ArmInput::Setpoint(setpoint) => self.set_setpoint(setpoint),
             ArmInput::Disturbance { effort, duration } => self.disturb(effort, duration),
             ArmInput::Period(period) => self.set_control_period(period),
+            ArmInput::Limits(limits) => self.set_limits(limits),
             ArmInput::State(state) => self.set_state(state),
             ArmInput::Command(effort) => self.set_command(effort),
             ArmInput::Drive(effort) => self.drive(effort),

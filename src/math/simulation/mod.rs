@@ -37,8 +37,9 @@ use self::increments::{leaves_out_first_angle, stepped};
 pub use self::increments::{state_after, step_under};
 pub use self::input::{ArmInput, StepNote};
 use super::arm::{Arm, State};
-use super::dynamics::{forward_dynamics, weightless_dynamics};
+use super::dynamics::{forward_dynamics, less_friction, weightless_dynamics};
 use super::integrator::Method;
+use super::limits::Limits;
 use super::pid::{Control, Gains, Pid, Setpoint};
 
 /// Default timestep \[s\]: at most a third of the stability limit of the default gains.
@@ -120,7 +121,7 @@ impl<const N: usize> Simulation<N> {
         Self {
             arm,
             pid: Pid::new(gains),
-            hold: Hold::new(Held::default(), DEFAULT_TIMESTEP),
+            hold: Hold::new(Held::default(), Limits::default(), DEFAULT_TIMESTEP),
             method: Method::Rk4,
             timestep: DEFAULT_TIMESTEP,
             state: State::rest(),
@@ -156,10 +157,12 @@ impl<const N: usize> Simulation<N> {
         }
         let with_time = self.steps_with_time(steps);
         // Evaluated once for all steps.
-        let taken = if leaves_out_first_angle(&self.arm) {
-            self.take_steps::<false>(with_time, observe)
+        let taken = if self.arm.has_friction() {
+            self.take_steps::<true, true>(with_time, observe)
+        } else if leaves_out_first_angle(&self.arm) {
+            self.take_steps::<false, false>(with_time, observe)
         } else {
-            self.take_steps::<true>(with_time, observe)
+            self.take_steps::<true, false>(with_time, observe)
         };
         match taken {
             ControlFlow::Break(taken) => taken,
@@ -173,14 +176,14 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// Takes `steps` steps. Breaks with the number of taken steps if the run ends early.
-    fn take_steps<const HAS_GRAVITY: bool>(
+    fn take_steps<const HAS_GRAVITY: bool, const HAS_FRICTION: bool>(
         &mut self,
         steps: u64,
         mut observe: impl FnMut(&Self) -> ControlFlow<()>,
     ) -> ControlFlow<u64> {
         // The match on method and control stays inside the loop: hoisting it gave no measured speedup.
         for taken in 0..steps {
-            if !self.take_step::<HAS_GRAVITY>() {
+            if !self.take_step::<HAS_GRAVITY, HAS_FRICTION>() {
                 self.diverge();
                 return ControlFlow::Break(taken);
             }
@@ -201,7 +204,7 @@ impl<const N: usize> Simulation<N> {
 
     /// Takes one step. If its result is not finite, changes nothing and returns `false`.
     #[inline]
-    fn take_step<const HAS_GRAVITY: bool>(&mut self) -> bool {
+    fn take_step<const HAS_GRAVITY: bool, const HAS_FRICTION: bool>(&mut self) -> bool {
         let mut held = None;
         let mut control = if !self.hold.every_step {
             self.begin_held_step(&mut held)
@@ -219,7 +222,9 @@ impl<const N: usize> Simulation<N> {
         let (arm, effort) = (&self.arm, &control.effort);
         let (next, carry) = stepped(
             |_, q: &[f64; N], v: &[f64; N]| {
-                if HAS_GRAVITY {
+                if HAS_FRICTION {
+                    forward_dynamics(arm, q, v, &less_friction(arm.viscous(), v, effort))
+                } else if HAS_GRAVITY {
                     forward_dynamics(arm, q, v, effort)
                 } else {
                     weightless_dynamics(arm, q, v, effort)
@@ -284,8 +289,8 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// Returns to the starting pose at rest, at time 0. Setpoint and integral are reset, all efforts are zero,
-    /// disturbance and divergence end, and a control period begins. Gains, arm, method, timestep, control period and
-    /// the controller's on/off state do not change.
+    /// disturbance and divergence end, and a control period begins. Gains, arm, method, timestep, control period,
+    /// limits and the controller's on/off state do not change.
     pub fn reset(&mut self) {
         self.set_state(State::rest());
         self.pid.reset();
@@ -311,7 +316,7 @@ impl<const N: usize> Simulation<N> {
         self.divergence = None;
     }
 
-    /// Effort of the latest step \[N m\], the controller's plus the disturbance's. It is zero as soon as the
+    /// Effort of the latest step \[N m\], that of the motors plus the disturbance's. It is zero as soon as the
     /// controller is turned off, and after a reset.
     #[must_use]
     pub fn effort(&self) -> &[f64; N] {
@@ -403,6 +408,24 @@ impl<const N: usize> Simulation<N> {
     pub fn drive(&mut self, effort: Option<[f64; N]>) {
         let change = |held: &mut Held<N>| held.driven = effort;
         self.hold.begin_period(self.timestep, change);
+    }
+
+    /// The limits of the motors.
+    #[must_use]
+    pub fn limits(&self) -> &Limits<N> {
+        &self.hold.limits
+    }
+
+    /// Changes the limits of the motors from the next step on. The integral and the control period go on. Each limit
+    /// must be finite and not negative, and the tracking time greater than 0.
+    pub fn set_limits(&mut self, limits: Limits<N>) {
+        self.hold.set_limits(limits, self.timestep);
+    }
+
+    /// The joints whose motor was at its limit in the latest step. A joint without a motor is not among them.
+    #[must_use]
+    pub fn at_limit(&self) -> [bool; N] {
+        self.hold.at_limit(self.pid.is_enabled())
     }
 
     /// Changes the gains and keeps the integral.

@@ -106,6 +106,13 @@ pub(super) const TYPES: &[Type] = types! {
         "float64 frequency  # Hz",
         "int64 joint",
     ],
+    "pendularm_interfaces/msg/HeldMode": [
+        "float64 growth_per_period",
+        "float64 frequency  # Hz",
+        "int64 joint",
+        "float64[] mode  # 1",
+        "bool reverses",
+    ],
     "rcl_interfaces/msg/Parameter": ["string name", "rcl_interfaces/msg/ParameterValue value"],
     "rcl_interfaces/msg/ParameterValue": [
         "uint8 type",

@@ -38,6 +38,10 @@ table! {
         SetParams = changes("/arm_sim/set_params", "pendularm_interfaces/srv/SetParams")
             .request(PARAMS)
             .response(PARAMS),
+        /// Viscous friction of the joints.
+        SetFriction = changes("/arm_sim/set_friction", "pendularm_interfaces/srv/SetFriction")
+            .request(fields!["float64[] viscous?  # N m s/rad"])
+            .response(fields!["float64[] viscous  # N m s/rad"]),
         /// Freezes and resumes simulation time.
         Pause = of_arm("/arm_sim/pause", "pendularm_interfaces/srv/Pause")
             .request(SWITCH)
@@ -102,6 +106,10 @@ table! {
         SetPeriod = changes("/pid_controller/set_period", "pendularm_interfaces/srv/SetPeriod")
             .request(fields!["float64 period?  # s", "bool delay?"])
             .response(fields!["float64 period  # s", "float64 effective_period  # s", "bool delay"]),
+        /// The limits of the motors, and the anti-windup.
+        SetLimits = changes("/pid_controller/set_limits", "pendularm_interfaces/srv/SetLimits")
+            .request(LIMITS)
+            .response(LIMITS),
         /// Joint positions for an end effector position.
         Solve = service("/ik/solve", "pendularm_interfaces/srv/Solve", Node::Ik)
             .request(fields!["float64 x  # m", "float64 y  # m", "float64 phi?  # rad"])
@@ -170,6 +178,33 @@ table! {
                 "float64 motion_speed  # rad/s",
                 "float64 advised_timestep  # s",
                 "float64 advised_duration  # s",
+            ])
+            .computation()
+            .null_is_absent(),
+        /// Predicts the largest stable control period of any robot.
+        HeldLimit = service("/study/held_limit", "pendularm_interfaces/srv/HeldLimit", Node::Study)
+            .request(fields![
+                "float64[] mass_matrix  # kg m^2",
+                "float64[] kp?  # N m/rad",
+                "float64[] kd?  # N m s/rad",
+                "float64[] ki?  # N m/(rad s)",
+                "float64[] damping?  # N m s/rad",
+                "float64[] stiffness?  # N m/rad",
+                "float64 period?  # s",
+                "uint64 delay?",
+                "string between?",
+                "uint64 steps?",
+            ])
+            .response(fields![
+                "float64 period_limit  # s",
+                "pendularm_interfaces/msg/HeldMode critical  # SI",
+                "float64[] effective_inertia  # kg m^2",
+                "bool stable",
+                "float64 growth_per_period  # 1",
+                "float64 timestep_limit  # s",
+                "float64 kd_factor_limit  # 1",
+                "float64 armature  # kg m^2",
+                "string explanation",
             ])
             .computation()
             .null_is_absent(),
@@ -277,6 +312,11 @@ const fn changes(name: &'static str, type_name: &'static str) -> ServiceEntry {
 
 const METHOD: &[Field] = fields!["string method?", "float64 timestep?  # s",];
 const STATE: &[Field] = fields!["float64[] position  # rad", "float64[] velocity  # rad/s",];
+const LIMITS: &[Field] = fields![
+    "float64[] effort?  # N m",
+    "string anti_windup?",
+    "float64 tracking_time?  # s",
+];
 const NAMES: &[Field] = fields!["string[] names"];
 const SWITCH: &[Field] = fields!["bool data?"];
 const DISTURBANCE: &[Field] = fields!["float64[] effort  # N m", "float64 duration  # s",];

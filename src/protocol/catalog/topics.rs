@@ -209,6 +209,7 @@ mod tests {
                 "/arm_sim/disturb",
                 "/arm_sim/pause",
                 "/arm_sim/reset",
+                "/arm_sim/set_friction",
                 "/arm_sim/set_integrator",
                 "/arm_sim/set_parameters",
                 "/arm_sim/set_params",
@@ -216,6 +217,7 @@ mod tests {
                 "/arm_sim/step",
                 "/pid_controller/enable",
                 "/pid_controller/set_gains",
+                "/pid_controller/set_limits",
                 "/pid_controller/set_period",
                 "/rosapi/set_param",
             ]

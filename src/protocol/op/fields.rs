@@ -155,6 +155,24 @@ impl<'a> Fields<'a> {
         self.numbers(name, N, bound)?.try_into().ok()
     }
 
+    /// The same, or `null` for none.
+    #[allow(
+        clippy::option_option,
+        reason = "an absent field is not a field that is null"
+    )]
+    pub fn array_or_null<const N: usize>(
+        &mut self,
+        name: &'static str,
+        bound: Bound,
+    ) -> Option<Option<[f64; N]>> {
+        let index = self.fields.iter().position(|field| field.name == name);
+        let raw = index.and_then(|index| self.values.get(index).copied().flatten());
+        if raw.is_some_and(|raw| raw.get() == "null") {
+            return Some(None);
+        }
+        self.array(name, bound).map(Some)
+    }
+
     /// `true` or `false`.
     pub fn boolean(&mut self, name: &'static str) -> Option<bool> {
         self.value(name, "true or false", json::boolean)

@@ -89,10 +89,13 @@ impl Rejections {
         self.0.push(RejectedField::refused(field, reason));
     }
 
-    /// Replaces a field's name by the sender's name for it.
+    /// Replaces a field's name by the sender's name for it, also before the index of an entry.
     pub fn rename(&mut self, field: &str, name: &str) {
-        for rejection in self.0.iter_mut().filter(|one| one.field == field) {
-            name.clone_into(&mut rejection.field);
+        for rejection in &mut self.0 {
+            let rest = rejection.field.strip_prefix(field);
+            if let Some(index) = rest.filter(|rest| rest.is_empty() || rest.starts_with('[')) {
+                rejection.field = format!("{name}{index}");
+            }
         }
     }
 

@@ -1,5 +1,7 @@
 //! Drops topic messages, the oldest first: too many, too old, or too long.
 //!
+//! The end of a goal is dropped last.
+//!
 //! **Invariant:** whole messages are dropped, nothing is reordered, and each dropped message is counted.
 
 use std::sync::Arc;
@@ -61,12 +63,15 @@ impl Outbox {
         self.topics.front().is_some_and(is_stale) && self.drop_but_newest(0)
     }
 
-    /// Drops a message, or a whole series, except the newest of the topic. Returns `true` if nothing is left.
+    /// Drops a message, or a whole series, except the newest of the topic and the end of a goal. Returns `true` if nothing is left.
     fn drop_but_newest(&mut self, index: usize) -> bool {
         let mut rest = self.topics.range_mut(index..);
         let Some(message) = rest.next() else {
             return true;
         };
+        if message.is_end_of_goal() {
+            return false;
+        }
         let is_newest = |topic: &Arc<str>| !rest.any(|newer| newer.is_on(topic));
         if !message.topic.as_ref().is_some_and(is_newest) {
             self.drop_message(index);
@@ -84,7 +89,8 @@ impl Outbox {
     }
 
     /// Drops topic messages, the oldest first, until at most [`MAX_TOPIC_BYTES`] are left. The oldest is the first in
-    /// the queue or the first held one. A series loses as many messages at once as necessary.
+    /// the queue or the first held one. A series loses as many messages at once as necessary. Ends of goals are dropped
+    /// after all others.
     pub(super) fn keep_bounded(&mut self) {
         loop {
             let cost = self.topic_bytes() + self.topic_count() * MESSAGE_BYTES;
@@ -92,7 +98,10 @@ impl Outbox {
             if excess == 0 {
                 return;
             }
-            let queued = self.topics.front();
+            let mut queue = self.topics.iter();
+            let first = queue.position(|message| !message.is_end_of_goal());
+            let first = first.unwrap_or(0);
+            let queued = self.topics.get(first);
             let queued = queued.map_or(u64::MAX, |first| first.number);
             let held = self.limits.values_mut();
             let held = held.filter(|one| one.first_held().is_some_and(|held| held < queued));
@@ -100,6 +109,8 @@ impl Outbox {
             if let Some(oldest) = held.and_then(|limits| limits.held.pop_front()) {
                 self.waiting.forget(&oldest);
                 self.dropped += 1;
+            } else if first > 0 {
+                self.drop_message(first);
             } else if let Some(QueuedMessage { frame, .. }) = self.topics.front() {
                 let (bytes, count) = first_messages(frame, excess);
                 self.dropped += count as u64;

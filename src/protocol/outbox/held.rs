@@ -77,7 +77,7 @@ impl Outbox {
     /// Drops the oldest messages of a topic with more waiting messages than the client's `queue_length`, while the
     /// client is slow.
     pub(super) fn keep_to_queue_length(&mut self, topic: &Arc<str>) {
-        if self.writing.is_empty() && self.room != Some(0) {
+        if self.writing.is_empty() && !self.room.is_used_up() {
             return;
         }
         let limits = self.limits.get(topic);

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
+use crate::protocol::catalog::Topic;
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::wire::lines::messages;
 
@@ -27,6 +28,12 @@ impl QueuedMessage {
     pub(super) fn is_on(&self, topic: &Arc<str>) -> bool {
         let own = self.topic.as_ref();
         own.is_some_and(|own| Arc::ptr_eq(own, topic) || own == topic)
+    }
+
+    /// Whether it is the end of a goal. It is neither dropped because of its age, nor before other messages, because
+    /// there are few, and clients wait for each.
+    pub(super) fn is_end_of_goal(&self) -> bool {
+        self.topic.as_deref() == Some(Topic::IkResult.name())
     }
 
     pub(super) fn is_older(&self, age: Duration, now: Instant) -> bool {

@@ -7,7 +7,7 @@
 //! A [series](crate::protocol::wire::series) is queued as one piece, but dropped and held back message by message.
 //!
 //! A message that has waited for longer than [`MAX_AGE`], or for half of it if the client is behind, is dropped, except
-//! the newest of its topic.
+//! the newest of its topic, and the ends of goals.
 //!
 //! The caller passes the time. The outbox has no socket and no clock.
 //!
@@ -41,12 +41,12 @@ use crate::protocol::wire::lines::first_message;
 pub struct Outbox {
     /// Topic messages in order.
     topics: VecDeque<QueuedMessage>,
-    /// The number of messages at the front that are too old. Each is the newest of its topic.
+    /// The number of messages at the front that are too old. Each is the newest of its topic, or the end of a goal.
     kept_old: usize,
     /// Whether a message has been too old since the queue was last empty.
     is_behind: bool,
-    /// Bytes of topic messages that may be taken, unless a response follows them; `None` means no limit.
-    room: Option<usize>,
+    /// Topic messages that may be taken, unless a response follows them. Only waiting messages have a limit.
+    room: Room,
     /// Largest age of a topic message that is taken only because a response follows it.
     fresh: Duration,
     /// Responses and statuses in order, with their numbers.
@@ -62,6 +62,28 @@ pub struct Outbox {
     /// The frames that are being written.
     writing: VecDeque<Writing>,
     dropped: u64,
+}
+
+/// Bytes of topic messages that a client may be sent now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Room {
+    /// As many as its socket takes.
+    #[default]
+    Unlimited,
+    /// The client is slow, and is sent so many bytes, and the rest of the message that the last one belongs to.
+    Bytes(u64),
+}
+
+impl Room {
+    const fn is_used_up(self) -> bool {
+        matches!(self, Self::Bytes(0))
+    }
+
+    fn use_up(&mut self, bytes: usize) {
+        if let Self::Bytes(left) = self {
+            *left = left.saturating_sub(bytes as u64);
+        }
+    }
 }
 
 /// A frame that is being written.
@@ -109,10 +131,10 @@ impl Outbox {
         self.responses.push_back((self.produced, frame));
     }
 
-    /// Sets how many bytes of topic messages may be taken from now on. Messages before a response are taken in
+    /// Sets how much of the waiting topic messages may be taken from now on. Messages before a response are taken in
     /// any case, unless they are older than `fresh`. Older ones are dropped, except the newest of each topic.
-    pub const fn allow(&mut self, room: usize, fresh: Duration) {
-        self.room = Some(room);
+    pub const fn allow(&mut self, room: Room, fresh: Duration) {
+        self.room = room;
         self.fresh = fresh;
     }
 
@@ -131,7 +153,7 @@ impl Outbox {
                 // Neither waits.
                 Ordering::Equal => break,
             };
-            if !is_response && self.room == Some(0) {
+            if !is_response && self.room.is_used_up() {
                 if !self.has_responses() {
                     break;
                 }
@@ -158,8 +180,8 @@ impl Outbox {
             } else {
                 self.take_first(length)
             };
-            if let Some(room) = self.room.as_mut().filter(|_| !is_response) {
-                *room = room.saturating_sub(length);
+            if !is_response {
+                self.room.use_up(length);
             }
             if let Some(rest) = frame {
                 self.writing.push_back(Writing {
@@ -169,7 +191,9 @@ impl Outbox {
                 });
             }
         }
-        self.is_behind &= self.has_topics();
+        if !self.has_topics() {
+            (self.is_behind, self.room) = (false, Room::Unlimited);
+        }
         self.check_sums();
     }
 
@@ -225,16 +249,17 @@ impl Outbox {
     /// Queues a message or a series. An old message of its topic is dropped.
     fn enqueue(&mut self, topic: Option<&Arc<str>>, since: Instant, frame: Bytes) {
         self.produced += 1;
-        let replaced = topic.filter(|_| self.kept_old > 0).and_then(|topic| {
-            let mut old = self.topics.range(..self.kept_old);
-            old.position(|message| message.is_on(topic))
-        });
         let message = QueuedMessage {
             number: self.produced,
             since,
             topic: topic.cloned(),
             frame,
         };
+        let replaced = topic.filter(|_| self.kept_old > 0 && !message.is_end_of_goal());
+        let replaced = replaced.and_then(|topic| {
+            let mut old = self.topics.range(..self.kept_old);
+            old.position(|message| message.is_on(topic))
+        });
         self.waiting.add(&message);
         self.topics.push_back(message);
         if let Some(replaced) = replaced {

@@ -14,6 +14,8 @@ table! {
         Masses = field_of(Service::SetParams, "masses"),
         /// Lengths of the links \[m\].
         Lengths = field_of(Service::SetParams, "lengths"),
+        /// Viscous friction of the joints \[N m s/rad\].
+        Viscous = field_of(Service::SetFriction, "viscous"),
         /// Proportional gains.
         Kp = field_of(Service::SetGains, "kp"),
         /// Integral gains.
@@ -32,6 +34,15 @@ table! {
             name: "control_period",
             ..field_of(Service::SetPeriod, "period")
         },
+        /// The largest efforts of the motors \[N m\]; without entries for no limit.
+        EffortLimit = ParameterEntry {
+            name: "effort_limit",
+            ..field_of(Service::SetLimits, "effort")
+        },
+        /// What the integral does while an effort is at its limit.
+        AntiWindup = field_of(Service::SetLimits, "anti_windup"),
+        /// The tracking time of the back calculation \[s\].
+        TrackingTime = field_of(Service::SetLimits, "tracking_time"),
         /// The arm as URDF, computed from lengths and masses; read only.
         RobotDescription = ParameterEntry { name: "robot_description", field: None },
     }

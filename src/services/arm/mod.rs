@@ -6,8 +6,10 @@
 //! **Invariant:** an invalid field never prevents a valid one from taking effect.
 
 mod disturb;
+mod friction;
 mod gains;
 mod integrator;
+mod limits;
 mod messages;
 mod parameters;
 mod period;
@@ -20,8 +22,10 @@ mod time;
 
 pub(crate) use self::disturb::DIVERGED;
 pub use self::disturb::{Disturb, Push};
+pub use self::friction::SetFriction;
 pub use self::gains::SetGains;
 pub use self::integrator::{Integrator, SetIntegrator};
+pub use self::limits::SetLimits;
 pub use self::messages::{joint_names, read_effort};
 pub use self::parameters::{
     AskParameters, NamedParameter, NotSet, ParameterChange, ParameterRequest, ParameterValue,

@@ -8,7 +8,7 @@ use bytes::Bytes;
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
-use super::{SetGains, SetIntegrator, SetParams, SetPeriod};
+use super::{SetFriction, SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod};
 use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, RejectedField, Rejections};
@@ -64,6 +64,8 @@ pub enum ParameterValue<const N: usize> {
     Number(f64),
     /// One per joint.
     PerJoint([f64; N]),
+    /// None, of a parameter that has one per joint if it is set.
+    Unset,
     /// A name or a description.
     Text(String),
 }
@@ -73,6 +75,7 @@ impl<const N: usize> From<ParameterValue<N>> for Value {
         match value {
             ParameterValue::Number(number) => number.into(),
             ParameterValue::PerJoint(numbers) => numbers.to_vec().into(),
+            ParameterValue::Unset => Value::Array(Vec::new()),
             ParameterValue::Text(text) => text.into(),
         }
     }
@@ -96,12 +99,16 @@ pub enum ParameterRequest<const N: usize> {
 pub enum ParameterChange<const N: usize> {
     /// Gravity, masses and lengths.
     Params(SetParams<N>),
+    /// Friction.
+    Friction(SetFriction<N>),
     /// Gains.
     Gains(SetGains<N>),
     /// Method and timestep.
     Integrator(SetIntegrator),
     /// The control period.
     Period(SetPeriod),
+    /// The limits of the motors.
+    Limits(SetLimits<N>),
 }
 
 /// Why a parameter was not set.
@@ -232,10 +239,15 @@ fn change<const N: usize>(
     value: &RawValue,
 ) -> Result<ParameterChange<N>, NotSet> {
     let (service, field) = parameter.field().ok_or(NotSet::Derived)?;
+    // A parameter has no value `null`. An array without entries stands for it.
+    let is_unset = parameter == Parameter::EffortLimit && value.get() == "[]";
+    let value = if is_unset { RawValue::NULL } else { value };
     let fields = &mut Fields::single(service, field, Some(value));
     Ok(match service {
         Service::SetParams => ParameterChange::Params(SetParams::from_fields(fields)),
+        Service::SetFriction => ParameterChange::Friction(SetFriction::from_fields(fields)),
         Service::SetGains => ParameterChange::Gains(SetGains::from_fields(fields)),
+        Service::SetLimits => ParameterChange::Limits(SetLimits::from_fields(fields)),
         Service::SetPeriod => ParameterChange::Period(SetPeriod::from_fields(fields)),
         _ => ParameterChange::Integrator(SetIntegrator::from_fields(fields)),
     })

@@ -30,7 +30,8 @@ impl<const N: usize> SetParams<N> {
             self.lengths.unwrap_or(*arm.lengths()),
             self.masses.unwrap_or(*arm.masses()),
             self.gravity.unwrap_or(arm.gravity()),
-        )
+        )?
+        .with_friction(*arm.viscous())
     }
 }
 

@@ -5,6 +5,7 @@
 //! **Invariant:** a computation is done in pieces, each of a fraction of a millisecond.
 
 mod advice;
+mod held_limit;
 mod integration;
 mod rollout;
 mod stability;
@@ -12,6 +13,7 @@ mod stability;
 use std::time::Duration;
 
 pub use self::advice::{PlanRun, PlannedRun, SuggestGains, Suggested};
+pub use self::held_limit::FindHeldLimit;
 pub use self::integration::{Integrating, IntegrationStep, NotIntegrated};
 pub use self::rollout::{Ran, RolloutWork, RunAnswer, RunOffline};
 pub use self::stability::{PredictStability, Predicted};

@@ -201,6 +201,7 @@ fn request<const N: usize>(
             method: ask.method.unwrap_or(control.method),
             timestep: ask.timestep.unwrap_or(control.timestep),
             period: with_period(control.period, ask.control_period),
+            ..*control
         },
         start: State {
             position: ask.q0.unwrap_or([0.0; N]),

@@ -128,7 +128,7 @@ fn control_loop<const N: usize>(
         gains: gains.map_or(present.gains, |gains| gains.applied_to(&present.gains)),
         setpoint: setpoint.unwrap_or(present.setpoint),
         method: ask.method.unwrap_or(present.method),
-        timestep: present.timestep,
         period: with_period(present.period, ask.control_period),
+        ..*present
     })
 }

@@ -14,7 +14,7 @@ use super::matrix::largest;
 use super::paused::{PieceWork, at_once};
 use crate::math::arm::{Arm, State};
 use crate::math::count::{length_in_f64, whole};
-use crate::math::dynamics::forward_dynamics;
+use crate::math::dynamics::{forward_dynamics, less_friction};
 use crate::math::integrator::two_sum;
 use crate::math::number::Arithmetic;
 use crate::math::trig;
@@ -99,6 +99,23 @@ impl<T: Precision, const N: usize> Drive<T, N> for [T; N] {
 
     fn coefficient(&self, _: &[T; N], _: &PowerSeries<T, N>, _: usize) -> [T; N] {
         [T::default(); N]
+    }
+}
+
+/// Constant efforts and viscous friction.
+struct Damped<const N: usize> {
+    effort: [f64; N],
+    viscous: [f64; N],
+}
+
+impl<const N: usize> Drive<f64, N> for Damped<N> {
+    fn efforts(&self, _: &[f64; N], velocity: &[f64; N]) -> [f64; N] {
+        less_friction(&self.viscous, velocity, &self.effort)
+    }
+
+    fn coefficient(&self, _: &[f64; N], series: &PowerSeries<f64, N>, k: usize) -> [f64; N] {
+        let rates = series::differences(&series.rate[k]);
+        less_friction(&self.viscous, &rates, &[0.0; N])
     }
 }
 
@@ -306,7 +323,13 @@ impl<const N: usize> TaylorReference<N> {
                 return false;
             }
             let before = self.coefficients();
-            self.0.step(arm, effort);
+            if arm.has_friction() {
+                let viscous = *arm.viscous();
+                let effort = *effort;
+                self.0.step(arm, &Damped { effort, viscous });
+            } else {
+                self.0.step(arm, effort);
+            }
             piece.spend(self.coefficients() - before).await;
         }
         self.state().is_finite()

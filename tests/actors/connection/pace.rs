@@ -79,18 +79,17 @@ async fn lateness(queue_length: u64, a_second: u32, chunk: usize) -> (Duration, 
 #[test]
 fn a_client_that_takes_half_of_the_messages_is_about_a_second_late_at_most() {
     in_virtual_time(async {
-        for (queue_length, a_second, chunk) in [
-            (0, 30, 8192),
-            (1, 30, 8192),
-            (0, 30, 100),
-            (5, 50, 8192),
-            (0, 20, 8192),
-            (0, 10, 300),
+        for (queue_length, a_second, chunk, most) in [
+            (0, 30, 100, 1500),
+            (1, 30, 100, 1500),
+            (5, 50, 8192, 1500),
+            (0, 30, 4096, 3000),
+            (1, 30, 4096, 3000),
         ] {
             let (late, count, queries) = lateness(queue_length, a_second, chunk).await;
             let case = format!("{queue_length} {a_second} {chunk}: {late:?}, {count}, {queries}");
             assert!(queries <= 30 * 20, "one in 50 ms: {case}");
-            assert!(late < Duration::from_millis(1500), "{case}");
+            assert!(late < Duration::from_millis(most), "{case}");
             assert!(
                 count > 22 * a_second as usize,
                 "it has enough to do: {case}"

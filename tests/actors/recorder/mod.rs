@@ -112,7 +112,7 @@ async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::R
         (0..N).map(|_| low + (high - low) * rng.f64()).collect()
     };
     let (poses, weights) = (numbers(-2.0, 2.0), numbers(0.5, 2.0));
-    let (service, args) = match rng.u32(..17) {
+    let (service, args) = match rng.u32(..19) {
         0 => ("/pid_controller/enable", json!({"data": rng.bool()})),
         1 => ("/pid_controller/set_gains", json!({"kp": weights})),
         2 => (
@@ -146,6 +146,21 @@ async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::R
             "/arm_sim/step",
             json!({"steps": rng.u32(1..50), "effort": weights}),
         ),
+        16 => {
+            let forms = ["clamp", "none", "conditional", "back_calculation"];
+            let effort = json!(
+                weights
+                    .iter()
+                    .map(|weight| 30.0 * weight)
+                    .collect::<Vec<_>>()
+            );
+            let effort = if rng.bool() { effort } else { json!(null) };
+            (
+                "/pid_controller/set_limits",
+                json!({"effort": effort, "anti_windup": rng.choice(forms).unwrap(), "tracking_time": 0.01 + rng.f64()}),
+            )
+        }
+        17 => ("/arm_sim/set_friction", json!({"viscous": weights})),
         14 => return client.command_effort(json!(weights)).await,
         15 => return follow_path(client, &poses).await,
         _ => return client.publish_trajectory(json!(poses)).await,

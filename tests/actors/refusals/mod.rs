@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 const WITHOUT_ROWS: &str = "name";
 
 /// Services that apply each field separately, with valid values that differ from the present ones.
-const FIELD_BY_FIELD: [(&str, &str); 7] = [
+const FIELD_BY_FIELD: [(&str, &str); 9] = [
     (
         "/arm_sim/set_integrator",
         r#"{"method":"euler","timestep":0.002}"#,
@@ -23,6 +23,7 @@ const FIELD_BY_FIELD: [(&str, &str); 7] = [
         "/arm_sim/set_params",
         r#"{"gravity":2.0,"masses":[2.0,3.0],"lengths":[0.5,0.25]}"#,
     ),
+    ("/arm_sim/set_friction", r#"{"viscous":[0.5,0.25]}"#),
     ("/arm_sim/pause", r#"{"data":true}"#),
     (
         "/arm_sim/set_state",
@@ -36,6 +37,10 @@ const FIELD_BY_FIELD: [(&str, &str); 7] = [
     (
         "/pid_controller/set_period",
         r#"{"period":0.02,"delay":true}"#,
+    ),
+    (
+        "/pid_controller/set_limits",
+        r#"{"effort":[25.0,10.0],"anti_windup":"conditional","tracking_time":0.5}"#,
     ),
 ];
 
@@ -110,6 +115,7 @@ fn required(service: &str) -> &'static [(&'static str, &'static str)] {
         "/arm_sim/step" => &[("steps", "1")],
         "/arm_sim/disturb" => &[("effort", "[1,1]"), ("duration", "1")],
         "/ik/solve" | "/ik_action/send_goal" => &[("x", "1"), ("y", "1")],
+        "/study/held_limit" => &[("mass_matrix", "[1]")],
         "/study/plan" => &[("error", "0.001")],
         "/arm_sim/get_parameters"
         | "/arm_sim/get_parameter_types"

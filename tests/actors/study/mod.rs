@@ -58,6 +58,7 @@ fn settings<const N: usize>() -> Present<N> {
                 period: 0.0,
                 delay: true,
             },
+            ..ControlLoop::free(Arm::default())
         },
         state: State {
             position: [0.3; N],

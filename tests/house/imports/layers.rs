@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::arrows::{PENDULARM, SourceTree};
 
 /// Layers that a layer may import, besides itself. A row names only rows above it.
-const LAYERS: [(&str, &[&str]); 19] = [
+const LAYERS: [(&str, &[&str]); 21] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
@@ -24,10 +24,13 @@ const LAYERS: [(&str, &[&str]); 19] = [
         &["protocol", "output", "address", "value", "signals"],
     ),
     ("plan", &["math", "study", "value"]),
+    ("score", &["math"]),
+    ("referee", &["output", "value", "signals"]),
     (
         "options",
         &[
             "protocol", "web", "report", "command", "logging", "address", "value", "plan",
+            "referee",
         ],
     ),
     (
@@ -41,8 +44,8 @@ const LAYERS: [(&str, &[&str]); 19] = [
     (
         "main",
         &[
-            "command", "logging", "output", "record", "report", "options", "plan", "actors",
-            "signals",
+            "command", "logging", "output", "record", "report", "options", "plan", "score",
+            "actors", "signals", "referee",
         ],
     ),
 ];
@@ -55,7 +58,7 @@ const PROTOCOL: [(&str, &[&str]); 8] = [
     ("wire", &["limits", "catalog"]),
     ("messages", &["wire"]),
     ("op", &["limits", "catalog", "wire", "messages"]),
-    ("outbox", &["limits", "wire"]),
+    ("outbox", &["catalog", "limits", "wire"]),
     ("ros", &["names", "catalog", "messages", "wire"]),
 ];
 

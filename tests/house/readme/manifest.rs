@@ -31,6 +31,18 @@ fn the_licence_files_are_those_that_the_manifest_names() {
     assert!(text("LICENSE-APACHE").contains("Apache License"));
 }
 
+/// `homepage` in `Cargo.toml` is the one place of the address of the public pages.
+#[test]
+fn every_link_to_the_public_pages_has_the_address_of_the_manifest() {
+    let manifest = text("Cargo.toml");
+    let (_, address) = manifest.split_once("\nhomepage = \"").unwrap();
+    let (address, _) = address.split_once('"').unwrap();
+    assert!(text("python/pyproject.toml").contains(&format!("\nHomepage = \"{address}\"\n")));
+    let readme = text("README.md");
+    assert_eq!(readme.matches(&format!("{address}/#step=1")).count(), 2);
+    assert_eq!(readme.matches("/#step=1").count(), 2);
+}
+
 /// Another platform has other crates.
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 #[test]

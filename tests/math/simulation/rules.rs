@@ -1,6 +1,7 @@
 //! Inputs in any order: the efforts, the controller and the time follow the rules below, and nothing else changes.
 
 use pendularm::math::arm::Arm;
+use pendularm::math::limits::{AntiWindup, Limits};
 use pendularm::math::pid::{Gains, Pid, Setpoint};
 use pendularm::math::simulation::{ArmInput, ControlPeriod, Simulation};
 use proptest::array::uniform2;
@@ -19,6 +20,7 @@ struct Rules {
     computed: [f64; 2],
     command: [f64; 2],
     driven: Option<[f64; 2]>,
+    limits: Limits<2>,
     /// A disturbance and its end.
     push: Option<([f64; 2], f64)>,
     /// The effort of the latest step.
@@ -27,6 +29,16 @@ struct Rules {
     base: f64,
     since_base: u64,
     steps: u64,
+}
+
+fn limits() -> impl Strategy<Value = Limits<2>> {
+    let effort = proptest::option::of(uniform2(0.0..20.0_f64));
+    let anti_windup = prop::sample::select(AntiWindup::ALL.to_vec());
+    (effort, anti_windup, 1e-3..1.0).prop_map(|(effort, anti_windup, tracking_time)| Limits {
+        effort,
+        anti_windup,
+        tracking_time,
+    })
 }
 
 fn input() -> impl Strategy<Value = ArmInput<2>> {
@@ -47,6 +59,7 @@ fn input() -> impl Strategy<Value = ArmInput<2>> {
         1 => (0.5..2.0).prop_map(gains),
         1 => uniform2(-1.0..1.0).prop_map(|position| ArmInput::Setpoint(Setpoint::at(position))),
         2 => effort().prop_map(ArmInput::Command),
+        1 => limits().prop_map(ArmInput::Limits),
         1 => (effort(), 1e-4..0.05)
             .prop_map(|(effort, duration)| ArmInput::Disturbance { effort, duration }),
     ]
@@ -63,6 +76,7 @@ impl Rules {
             computed: [0.0; 2],
             command: [0.0; 2],
             driven: None,
+            limits: Limits::default(),
             push: None,
             effort: [0.0; 2],
             base: 0.0,
@@ -113,6 +127,7 @@ impl Rules {
                 self.law.set_setpoint(setpoint);
                 assert_eq!(*self.law.setpoint(), setpoint);
             }
+            ArmInput::Limits(limits) => self.limits = limits,
             ArmInput::Command(effort) => self.command = effort,
             ArmInput::Disturbance { effort, duration } => {
                 self.push = Some((effort, self.time() + duration));
@@ -133,7 +148,7 @@ impl Rules {
             let length = self.period.steps(self.timestep);
             if self.held_for.is_none_or(|steps| steps == length) {
                 let dt = self.period.effective(self.timestep);
-                let control = self.law.control(simulation.state(), dt);
+                let control = self.limits.control(&self.law, simulation.state(), dt);
                 self.law.commit(control.integral);
                 self.held = control.effort;
                 if self.period.delay {
@@ -144,6 +159,10 @@ impl Rules {
             self.held_for = self.held_for.map(|steps| steps + 1);
             self.held
         };
+        if let Some(limit) = self.limits.effort {
+            self.effort =
+                std::array::from_fn(|i| self.effort[i].max(-limit[i]).min(limit[i]) + 0.0);
+        }
         if let Some((push, _)) = self.push.filter(|(_, ends)| self.time() < *ends) {
             self.effort = std::array::from_fn(|i| self.effort[i] + push[i]);
         }
@@ -156,6 +175,7 @@ impl Rules {
         assert_eq!(*simulation.pid(), self.law);
         assert_eq!(*simulation.command(), self.command);
         assert_eq!(simulation.control_period(), self.period);
+        assert_eq!(*simulation.limits(), self.limits);
         assert_eq!(simulation.time(), self.time());
         assert_eq!(simulation.steps(), self.steps);
         let mut next = self.clone();

@@ -1,6 +1,8 @@
 //! Bytes and costs of frames until they have been written.
 
+use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::limits::{MEDIUM, SHORT};
+use pendularm::protocol::outbox::MAX_TOPIC_BYTES;
 
 use super::Bench;
 
@@ -45,4 +47,20 @@ fn a_long_message_is_there_until_its_last_byte_has_been_written() {
         bench.push("/a", vec![b'x'; length]);
         assert_eq!(bench.outbox.topic_count(), count);
     }
+}
+
+#[test]
+fn a_flood_drops_no_end_of_a_goal() {
+    let mut bench = Bench::new();
+    let message = vec![b'x'; 1000];
+    for _ in 0..4 {
+        bench.push(Topic::IkResult.name(), "end");
+        (0..1000).for_each(|_| bench.push("/a", message.clone()));
+    }
+    let ends = bench.take(usize::MAX, usize::MAX);
+    assert_eq!(ends.iter().filter(|frame| *frame == "end").count(), 4);
+    assert_eq!(bench.outbox.dropped() as usize, 4004 - ends.len());
+    // They are bounded too.
+    (0..10_000).for_each(|_| bench.push(Topic::IkResult.name(), message.clone()));
+    assert!(bench.outbox.topic_bytes() < MAX_TOPIC_BYTES);
 }

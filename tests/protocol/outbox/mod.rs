@@ -3,6 +3,7 @@
 //! **Invariant:** time is a parameter; no test waits.
 
 mod costs;
+mod pacing;
 mod properties;
 mod series;
 mod steps;

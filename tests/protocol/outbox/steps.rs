@@ -1,7 +1,7 @@
 //! Throttled topics, messages that wait for a long time, and bounded queues, step by step.
 //!
-//! `a1` is a message on `/a`, `f1` feedback and `r1` a response, each with this text; `r1-a` outdates the messages of `/a`, and `f*` is
-//! longer than a message may be. `~a100/2` is an interval of 100 ms that holds back 2 messages, `qa2` a queue of 2 messages, and `!a` an
+//! `a1` is a message on `/a`, `f1` feedback, `g1` the end of a goal and `r1` a response, each with this text; `r1-a` outdates the
+//! messages of `/a`, and `f*` is longer than a message may be. `~a100/2` is an interval of 100 ms that holds back 2 messages, `qa2` a queue of 2 messages, and `!a` an
 //! unsubscription. `+50` lets 50 ms pass, `=a1,a2` takes all frames, `=9:a1` at most 9 bytes, and `-a1` one frame; `w2` writes 2 bytes.
 //! `(0/200` is a socket with room for 0 bytes, for which a message is fresh for 200 ms. `?50` is the time until the next release, `#4` is
 //! the number of counted bytes, `%3` of waiting messages, and `x1` of dropped ones.
@@ -11,9 +11,10 @@ use std::time::Duration;
 use bytes::Bytes;
 
 use super::Bench;
-use pendularm::protocol::outbox::{MAX_MESSAGE, Throttle};
+use pendularm::protocol::catalog::Topic;
+use pendularm::protocol::outbox::{MAX_MESSAGE, Room, Throttle};
 
-const ROWS: [(&str, &str); 17] = [
+const ROWS: [(&str, &str); 18] = [
     (
         "the newest messages are held, and one leaves per interval",
         "~a100/2 a1 a2 a3 a4 #6 =a1 #4 ?100 +99 = ?1 +1 =a3 ?100 +100 =a4 ? #0 x0",
@@ -63,6 +64,10 @@ const ROWS: [(&str, &str); 17] = [
         "a1 a2 +1001 a3 a4 x2 -a3 a5 +501 =a5 x3 a6 a7 +501 =a6,a7 b1 +1001 a8 a9 +501 =b1,a8,a9 x3",
     ),
     (
+        "the end of a goal is never too old",
+        "g1 g2 a1 a2 +1001 g3 +1001 a3 x2 =g1,g2,g3,a3 x2 g4 r1 +300 g5 (0/200 =g4,r1 (9/0 =g5",
+    ),
+    (
         "the age of a message counts from its release by the throttle",
         "~a5000/2 a1 a2 a3 =a1 +5000 =a2 +5000 =a3 x0",
     ),
@@ -107,7 +112,9 @@ fn play(bench: &mut Bench, step: &'static str) {
         "(" => {
             let (room, ms) = rest.split_once('/').unwrap();
             let fresh = Duration::from_millis(ms.parse().unwrap());
-            bench.outbox.allow(room.parse().unwrap(), fresh);
+            bench
+                .outbox
+                .allow(Room::Bytes(room.parse().unwrap()), fresh);
         }
         "+" => bench.advance(rest.parse().unwrap()),
         "-" => assert_eq!(bench.take(1, usize::MAX), [rest]),
@@ -130,6 +137,7 @@ fn play(bench: &mut Bench, step: &'static str) {
             let frame = if rest == "*" { long } else { step.into() };
             bench.outbox.push_feedback(frame, bench.now);
         }
+        "g" => bench.push(Topic::IkResult.name(), Bytes::from(step)),
         "r" => {
             let (text, outdated) = step.split_once('-').unwrap_or((step, "none"));
             bench.respond(text, &[topic(outdated).as_str()]);

@@ -7,6 +7,8 @@ mod advice;
 mod gains;
 mod limits;
 mod motions;
+mod requests;
+mod zero_gains;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

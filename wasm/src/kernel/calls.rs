@@ -8,7 +8,8 @@ use pendularm::protocol::messages;
 use pendularm::protocol::op::{Arguments, CallService};
 use pendularm::protocol::wire::json::Payload;
 use pendularm::services::arm::{
-    Disturb, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetPeriod, SetState, Step,
+    Disturb, Enable, Pause, Reset, SetFriction, SetGains, SetIntegrator, SetLimits, SetParams,
+    SetPeriod, SetState, Step,
 };
 use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
 use pendularm::services::study::{
@@ -41,11 +42,13 @@ impl<const N: usize> Kernel<N> {
         match own {
             Service::SetIntegrator => self.of_arm::<SetIntegrator>(own, &args, &to),
             Service::SetParams => self.of_arm::<SetParams<N>>(own, &args, &to),
+            Service::SetFriction => self.of_arm::<SetFriction<N>>(own, &args, &to),
             Service::Pause => self.of_arm::<Pause>(own, &args, &to),
             Service::Reset => self.of_arm::<Reset<N>>(own, &args, &to),
             Service::SetState => self.of_arm::<SetState<N>>(own, &args, &to),
             Service::Disturb => self.of_arm::<Disturb<N>>(own, &args, &to),
             Service::SetGains => self.of_arm::<SetGains<N>>(own, &args, &to),
+            Service::SetLimits => self.of_arm::<SetLimits<N>>(own, &args, &to),
             Service::SetPeriod => self.of_arm::<SetPeriod>(own, &args, &to),
             Service::Enable => self.of_arm::<Enable>(own, &args, &to),
             Service::Step => self.answer::<Step<N>>(own, &args, &to, Self::step),

@@ -14,8 +14,8 @@ use crate::actors::node::{Call, Nodes, ShutDown, Unserved};
 use crate::live::ArmRequest;
 use crate::protocol::catalog::{Node, Rosapi, Service, Topic};
 use crate::services::arm::{
-    AskParameters, Disturb, Enable, GetTime, Pause, Reset, SetGains, SetIntegrator, SetParams,
-    SetPeriod, SetState, Step, parameter_services,
+    AskParameters, Disturb, Enable, GetTime, Pause, Reset, SetFriction, SetGains, SetIntegrator,
+    SetLimits, SetParams, SetPeriod, SetState, Step, parameter_services,
 };
 use crate::services::goals::Solve;
 
@@ -24,9 +24,11 @@ impl<const N: usize> ArmSim<N> {
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         orders::subscribe(address, nodes);
         nodes.serve::<Disturb<N>>(Service::Disturb, address.clone());
+        nodes.serve::<SetFriction<N>>(Service::SetFriction, address.clone());
         nodes.serve::<SetGains<N>>(Service::SetGains, address.clone());
         nodes.serve::<SetIntegrator>(Service::SetIntegrator, address.clone());
         nodes.serve::<SetParams<N>>(Service::SetParams, address.clone());
+        nodes.serve::<SetLimits<N>>(Service::SetLimits, address.clone());
         nodes.serve::<SetPeriod>(Service::SetPeriod, address.clone());
         nodes.serve::<Reset<N>>(Service::Reset, address.clone());
         nodes.serve::<SetState<N>>(Service::SetState, address.clone());

@@ -29,8 +29,8 @@ use crate::actors::resources::turns::{Timer, end_turn};
 use crate::actors::resources::unread::Ends;
 use crate::protocol::catalog::Service;
 use crate::protocol::limits::{MEDIUM, SHORT};
-use crate::protocol::outbox::Outbox;
 use crate::protocol::outbox::flow::{FlowControl, UnreadSource};
+use crate::protocol::outbox::{Outbox, Room};
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -154,12 +154,11 @@ impl<S: ClientStream> Connection<S> {
         if self.outbox.is_empty() && !holds_back {
             return false;
         }
-        let room = if self.is_finishing {
-            usize::MAX
-        } else if has_topics || holds_back {
-            self.flow.room(now.into_std())
+        // Only topic messages need room.
+        let room = if self.is_finishing || !(has_topics || holds_back) {
+            Room::Unlimited
         } else {
-            0
+            self.flow.room(now.into_std())
         };
         let most = if self.is_single { 1 } else { WRITE_FRAMES };
         let fresh = self.flow.max_age();

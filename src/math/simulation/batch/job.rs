@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** an arm is written back once: after its last step, or when a result is not finite.
 
-use crate::math::arm::State;
+use crate::math::arm::{Arm, State};
 use crate::math::count::partition_point;
 use crate::math::integrator::Method;
 use crate::math::simulation::increments::leaves_out_first_angle;
@@ -14,37 +14,62 @@ pub(super) struct StepKind {
     pub(super) method: Method,
     /// Whether the control law runs in every step.
     pub(super) controlled: bool,
-    /// Whether the dynamics use the first angle (they do with gravity).
-    pub(super) has_gravity: bool,
+    pub(super) dynamics: StepDynamics,
+}
+
+/// The terms of the equation of motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum StepDynamics {
+    /// Without gravity and the first angle.
+    Weightless,
+    /// With gravity.
+    Frictionless,
+    /// With gravity and friction.
+    Damped,
+}
+
+impl StepDynamics {
+    const ALL: [Self; 3] = [Self::Weightless, Self::Frictionless, Self::Damped];
+
+    fn of<const N: usize>(arm: &Arm<N>) -> Self {
+        if arm.has_friction() {
+            Self::Damped
+        } else if leaves_out_first_angle(arm) {
+            Self::Weightless
+        } else {
+            Self::Frictionless
+        }
+    }
 }
 
 impl StepKind {
     /// The number of kinds.
-    pub(super) const COUNT: usize = 4 * Method::ALL.len();
+    pub(super) const COUNT: usize = 2 * StepDynamics::ALL.len() * Method::ALL.len();
 
     pub(super) fn of<const N: usize>(arm: &Simulation<N>) -> Self {
         Self {
             method: arm.method,
             controlled: arm.pid.is_enabled() && arm.hold.every_step,
-            has_gravity: !leaves_out_first_angle(&arm.arm),
+            dynamics: StepDynamics::of(&arm.arm),
         }
     }
 
     pub(super) fn all() -> impl Iterator<Item = Self> {
         Method::ALL.into_iter().flat_map(|method| {
-            [(false, false), (false, true), (true, false), (true, true)].map(
-                |(controlled, has_gravity)| Self {
+            [false, true].into_iter().flat_map(move |controlled| {
+                StepDynamics::ALL.map(|dynamics| Self {
                     method,
                     controlled,
-                    has_gravity,
-                },
-            )
+                    dynamics,
+                })
+            })
         })
     }
 
     /// Its place in [`StepKind::all`].
     pub(super) fn index(self) -> usize {
-        4 * self.method as usize + 2 * usize::from(self.controlled) + usize::from(self.has_gravity)
+        let kinds = StepDynamics::ALL.len();
+        kinds * (2 * self.method as usize + usize::from(self.controlled)) + self.dynamics as usize
     }
 }
 

@@ -13,7 +13,7 @@ use fearless_simd::Simd;
 
 use super::job::BatchJob;
 use crate::math::arm::{Rod, State};
-use crate::math::dynamics::recursion;
+use crate::math::dynamics::{less_friction, recursion};
 use crate::math::integrator::Method;
 use crate::math::number::{Arithmetic, Number, Wide, apart, entries};
 use crate::math::pid::{Control, Gains, Setpoint, law};
@@ -96,6 +96,7 @@ pub(super) struct Lanes<T, const N: usize> {
     pub(super) moving: Moving<T, N>,
     rods: [Rod<T>; N],
     gravity: T,
+    viscous: [T; N],
     gains: Gains<N, T>,
     setpoint: Setpoint<N, T>,
     timestep: T,
@@ -120,6 +121,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
                 per_mass_length: one,
             }; N],
             gravity: zero,
+            viscous: [zero; N],
             gains: Gains {
                 kp: [zero; N],
                 ki: [zero; N],
@@ -157,6 +159,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
                 moving,
                 rods: arm.arm.rods,
                 gravity: arm.arm.gravity(),
+                viscous: *arm.arm.viscous(),
                 gains: *gains,
                 setpoint: *setpoint,
                 timestep: arm.timestep,
@@ -206,6 +209,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
             set(&mut self.gains.kd[i], arm.gains.kd[i]);
             set(&mut self.setpoint.position[i], arm.setpoint.position[i]);
             set(&mut self.setpoint.velocity[i], arm.setpoint.velocity[i]);
+            set(&mut self.viscous[i], arm.viscous[i]);
             set(&mut self.given[i], arm.given[i]);
             set(&mut self.push[i], arm.push[i]);
         }
@@ -217,7 +221,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
 impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
     /// The state after the next step.
     #[inline(always)]
-    pub(super) fn next<const HAS_GRAVITY: bool>(
+    pub(super) fn next<const HAS_GRAVITY: bool, const HAS_FRICTION: bool>(
         &self,
         method: Method,
         controlled: bool,
@@ -242,7 +246,7 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
         let (state, carry) = if method == Method::Euler {
             stepped(
                 #[inline(always)]
-                |_, q, v| self.accelerations::<HAS_GRAVITY>(q, v, &effort),
+                |_, q, v| self.accelerations::<HAS_GRAVITY, HAS_FRICTION>(q, v, &effort),
                 Method::Euler,
                 state,
                 carry,
@@ -253,7 +257,7 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
                 apart(
                     self.timestep.token(),
                     #[inline(always)]
-                    || self.accelerations::<HAS_GRAVITY>(q, v, &effort),
+                    || self.accelerations::<HAS_GRAVITY, HAS_FRICTION>(q, v, &effort),
                 )
             };
             stepped(shared, method, state, carry, self.timestep)
@@ -267,12 +271,17 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
     }
 
     #[inline(always)]
-    fn accelerations<const HAS_GRAVITY: bool>(
+    fn accelerations<const HAS_GRAVITY: bool, const HAS_FRICTION: bool>(
         &self,
         q: &[Wide<S, K>; N],
         v: &[Wide<S, K>; N],
         effort: &[Wide<S, K>; N],
     ) -> [Wide<S, K>; N] {
-        recursion::<_, N, HAS_GRAVITY>(&self.rods, &self.gravity, q, v, effort)
+        if HAS_FRICTION {
+            let effort = &less_friction(&self.viscous, v, effort);
+            recursion::<_, N, HAS_GRAVITY>(&self.rods, &self.gravity, q, v, effort)
+        } else {
+            recursion::<_, N, HAS_GRAVITY>(&self.rods, &self.gravity, q, v, effort)
+        }
     }
 }

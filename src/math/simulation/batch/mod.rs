@@ -1,7 +1,7 @@
 //! Many simulations advanced side by side, with one SIMD lane each.
 //!
-//! Arms share a register if they have the same method, if all controllers are on or all are off, and if all have
-//! gravity or none has. State, parameters, gains, setpoint, timestep, disturbance and number of steps may differ.
+//! Arms share a register if they have the same method, if all controllers are on or all are off, if all have
+//! gravity or none has, and if all have friction or none has. State, parameters, gains, setpoint, timestep, disturbance and number of steps may differ.
 //! The number of lanes depends on the processor at run time: 8 with AVX-512, 4 with AVX2, 2 with NEON or SSE2.
 //!
 //! The formulas are those of one arm, with another number type ([`crate::math::number`]): two registers at a time. A

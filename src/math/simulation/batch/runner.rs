@@ -14,7 +14,7 @@ use std::vec::Drain;
 
 use fearless_simd::Simd;
 
-use super::job::{BatchJob, StepKind};
+use super::job::{BatchJob, StepDynamics, StepKind};
 use super::lanes::{Lanes, Moving};
 use crate::math::number::{Number, Wide};
 
@@ -57,10 +57,10 @@ impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
     #[inline(always)]
     pub(super) fn run(mut self, kind: StepKind) {
         while let Some(steps) = self.until_look() {
-            if kind.has_gravity {
-                self.take_steps::<true>(kind, steps);
-            } else {
-                self.take_steps::<false>(kind, steps);
+            match kind.dynamics {
+                StepDynamics::Weightless => self.take_steps::<false, false>(kind, steps),
+                StepDynamics::Frictionless => self.take_steps::<true, false>(kind, steps),
+                StepDynamics::Damped => self.take_steps::<true, true>(kind, steps),
             }
             self.look(steps);
         }
@@ -72,7 +72,11 @@ impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
     }
 
     #[inline(always)]
-    fn take_steps<const HAS_GRAVITY: bool>(&mut self, kind: StepKind, steps: u64) {
+    fn take_steps<const HAS_GRAVITY: bool, const HAS_FRICTION: bool>(
+        &mut self,
+        kind: StepKind,
+        steps: u64,
+    ) {
         let mut jobs = self.jobs.chunks(Wide::<S, K>::LANES);
         let taken: [bool; PAIRS] = [(); PAIRS].map(|()| {
             jobs.next()
@@ -83,7 +87,8 @@ impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
                 if !taken[index] {
                     continue;
                 }
-                let mut next = lanes.next::<HAS_GRAVITY>(kind.method, kind.controlled);
+                let mut next =
+                    lanes.next::<HAS_GRAVITY, HAS_FRICTION>(kind.method, kind.controlled);
                 if !Wide::<S, K>::all_finite(&next.state.position, &next.state.velocity) {
                     // This part is a separate function, so the loop's other values stay in registers.
                     let mut parted = next;

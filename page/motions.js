@@ -1,0 +1,83 @@
+// Two motions of a scene beside each other: the correct one, slowly, and one that fails, with a longer timestep or another method.
+// Invariant: both are runs of the runtime, from the same start. The live arm does not change.
+
+import { links as drawLinks, STRONG, TEXT, write } from "./chart.js";
+import { duration, methodName, significant } from "./format.js";
+import { endOf } from "./ladder.js";
+import { joints, reach } from "./mechanics.js";
+import { noGains } from "./question.js";
+import { settingsOf } from "./scenes.js";
+import { colors } from "./theme.js";
+
+/** @typedef {import("./scenes.js").Scene} Scene */
+/** @typedef {import("./question.js").Question} Question */
+/** @typedef {{question: Question, run: import("./question.js").Run}} Wanted */
+/** @typedef {{name: string, note: string, poses: (number[] | null)[], lengths: number[], color: string}} Motion */
+
+/** The scenes of the course, each with method and timestep [s] of the motion that fails. @type {Record<string, {method?: string, timestep: number}>} */
+export const FAILING = {
+  S04: { method: "euler", timestep: 0.02 }, S05: { method: "euler", timestep: 0.01 }, S07: { timestep: 0.004 }, S08: { timestep: 0.001 },
+  S09: { timestep: 0.001 }, S10: { timestep: 0.004 }, S11: { timestep: 0.05 }, S16: { timestep: 0.001 }, S17: { timestep: 0.001 },
+  S18: { timestep: 0.001 }, S27: { timestep: 0.05 }, S29: { timestep: 1 },
+};
+
+/** Pictures of a motion. */
+const SAMPLES = 241;
+/** A failing run has at least this many steps, so that its failure shows. */
+const LEAST_STEPS = 24;
+
+/** The correct and the failing run of a scene. @param {Scene} scene @returns {{correct: Wanted, failing: Wanted}} */
+export function motionsOf(scene) {
+  const { params, gains, period, controller, setpoint, integrator } = /** @type {any} */ (settingsOf(scene));
+  const { seconds = 2, timestep = integrator.timestep, start = scene.start } = scene.watch ?? {};
+  const fails = FAILING[scene.id] ?? { timestep: 0.05 };
+  const loop = {
+    params, gains: controller ? gains : noGains(scene.links), setpoint: setpoint ?? start, q: start, qd: scene.velocity ?? start.map(() => 0),
+    control_period: controller ? period.period : 0, delay: controller ? period.delay : false,
+  };
+  const lasts = Math.max(seconds, LEAST_STEPS * fails.timestep);
+  return {
+    correct: { question: { ...loop, integrator: integrator.method, timestep }, run: { duration: seconds, samples: SAMPLES } },
+    failing: { question: { ...loop, integrator: fails.method ?? integrator.method, timestep: fails.timestep }, run: { duration: lasts, samples: SAMPLES } },
+  };
+}
+
+/** What is drawn of an answer. @param {Wanted} wanted @param {any} values @param {boolean} isCorrect @param {number} playedIn [s] @returns {Motion} */
+export function motionOf({ question, run }, values, isCorrect, playedIn) {
+  const ended = endOf(values.times, run.duration, question.timestep);
+  const slower = playedIn / run.duration;
+  const pace = slower > 1 ? `${significant(slower, 2)} times slower` : `${significant(1 / slower, 2)} times faster`;
+  return {
+    name: `${isCorrect ? "Correct" : "Failing"}: ${methodName(question.integrator)}, ${duration(question.timestep)}`,
+    note: ended !== null ? `diverged at ${duration(ended)}` : `${duration(run.duration)}, ${pace}`,
+    poses: values.positions.map((/** @type {number[]} */ q) => (q?.every(Number.isFinite) ? q : null)),
+    lengths: question.params.lengths, color: isCorrect ? "good" : "bad",
+  };
+}
+
+/** Most poses of the past that are drawn behind the present one. */
+const SHADOWS = 6;
+const APART = 4; // samples between them
+
+/** @param {import("./surface.js").Surface} surface @param {Motion[]} motions @param {number} part of the time, from 0 to 1 */
+export function drawMotions({ context, width, height }, motions, part) {
+  const half = width / motions.length;
+  motions.forEach(({ name, note, poses, lengths, color }, side) => {
+    const scale = Math.min(half, height - 48) / (2.1 * reach(lengths));
+    const px = (/** @type {number} */ metres) => half * (side + 0.5) + scale * metres;
+    const py = (/** @type {number} */ metres) => 44 + (height - 48) / 2 - scale * metres;
+    const at = Math.min(poses.length - 1, Math.floor(part * (SAMPLES - 1)));
+    context.lineCap = context.lineJoin = "round";
+    for (let k = SHADOWS; k >= 0; k -= 1) {
+      const q = poses[Math.max(0, at - APART * k)];
+      if (!q) continue;
+      const [x, y] = [/** @type {number[]} */ ([]), /** @type {number[]} */ ([])];
+      joints(lengths.length, q, lengths, x, y);
+      context.globalAlpha = k === 0 ? 1 : 0.25 * (1 - k / (SHADOWS + 1));
+      drawLinks(context, lengths.length, x, y, px, py, colors[color], 5);
+    }
+    context.globalAlpha = 1;
+    write(context, name, half * (side + 0.5), 12, "center", colors.ink, STRONG);
+    write(context, note, half * (side + 0.5), 32, "center", colors.muted, TEXT);
+  });
+}

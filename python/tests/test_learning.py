@@ -1,0 +1,146 @@
+"""The adapters to stable-baselines3 and Ray. `make test-learning` installs both; without them these tests are skipped."""
+
+import importlib.util
+import sys
+import types
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+import pendularm
+import pendularm.envs
+
+has_torch = importlib.util.find_spec("torch") is not None
+FOUND = importlib.util.find_spec("stable_baselines3")
+
+
+@pytest.fixture
+def sb3():
+    """The adapter. Without torch, the packages around `base_vec_env` are replaced by empty ones."""
+    if FOUND is None:
+        pytest.skip("stable-baselines3 is not installed")
+    if not has_torch and "stable_baselines3" not in sys.modules:
+        place, name = Path(FOUND.origin).parent, "stable_baselines3"
+        for part in ["", "common", "vec_env"]:
+            name, place = (f"{name}.{part}", place / part) if part else (name, place)
+            sys.modules[name] = types.ModuleType(name)
+            sys.modules[name].__path__ = [str(place)]
+    return pendularm.envs.sb3
+
+
+@pytest.fixture
+def make(sb3):
+    made = []
+
+    def of(*arguments, **options):
+        made.append(sb3(*arguments, **options))
+        return made[-1]
+
+    yield of
+    for env in made:
+        env.close()
+
+
+def test_the_arms_are_those_of_the_vector_environment(make, name, links):
+    ours = make(name, 5, links=links, max_episode_steps=7)
+    theirs = gymnasium.make_vec(name, 5, links=links, max_episode_steps=7, autoreset_mode="SameStep")
+    assert ours.num_envs == 5
+    assert (ours.observation_space, ours.action_space) == (theirs.single_observation_space, theirs.single_action_space)
+    assert ours.seed(7) == [7, 8, 9, 10, 11]
+    assert np.array_equal(ours.reset(), theirs.reset(seed=7)[0])
+    random, ends = np.random.default_rng(1), 0
+    for _ in range(40):
+        actions = random.uniform(-1, 1, (5, links)).astype(np.float32)
+        observations, rewards, dones, infos = ours.step(actions)
+        expected = theirs.step(actions)
+        assert np.array_equal(observations, expected[0])
+        assert np.array_equal(rewards, expected[1].astype(np.float32))
+        assert rewards.dtype == np.float32
+        assert np.array_equal(dones, expected[2] | expected[3])
+        for arm, info in enumerate(infos):
+            assert info["TimeLimit.truncated"] is bool(expected[3][arm] and not expected[2][arm])
+            assert ("terminal_observation" in info) == dones[arm]
+            if dones[arm]:
+                assert np.array_equal(info["terminal_observation"], expected[4]["final_obs"][arm])
+                ends += 1
+    assert ends > 15
+
+
+def test_attributes_and_methods_are_those_of_the_arms(make):
+    env = make("Pendularm-v0", 3, render_mode="rgb_array")
+    env.reset()
+    assert env.get_attr("render_mode") == ["rgb_array"] * 3
+    assert env.get_attr("action_space", [0, 2]) == [env.action_space] * 2
+    assert env.get_attr("num_envs", 1) == [3]
+    assert env.env_is_wrapped(gymnasium.Wrapper) == [False] * 3
+    assert not env.has_attr("nothing")
+    env.set_attr("note", 5)
+    assert env.get_attr("note") == [5] * 3
+    (state,) = env.env_method("get_state", indices=[0])
+    before = env.step(np.ones((3, 2), np.float32))[0]
+    env.env_method("set_state", state, indices=0)
+    assert np.array_equal(env.step(np.ones((3, 2), np.float32))[0], before)
+    assert [frame.shape for frame in env.get_images()] == [(480, 480, 3)] * 3
+    assert env.render().shape == (960, 960, 3)
+
+
+def test_two_seeds_differ_and_one_repeats(make):
+    env = make("PendularmReach-v0", 4)
+    env.seed(3)
+    first = env.reset()
+    assert not np.array_equal(env.reset(), first)
+    env.seed(3)
+    assert np.array_equal(env.reset(), first)
+
+
+@pytest.mark.skipif(not has_torch, reason="PPO needs torch")
+def test_ppo_learns_on_it(make):
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+
+    env = VecNormalize(VecMonitor(make("Pendularm-v0", 16)))
+    model = PPO("MlpPolicy", env, n_steps=64, seed=0, device="cpu").learn(2048)
+    assert model.num_timesteps >= 2048
+
+
+class Remote:
+    """A remote function that is called at once."""
+
+    def __init__(self, ray, function):
+        self.ray, self.function = ray, function
+
+    def remote(self, *args):
+        from concurrent.futures import Future
+
+        self.ray.calls.append(args)
+        done = Future()
+        done.set_result(self.function(*(arg["stored"] if isinstance(arg, dict) else arg for arg in args)))
+        return types.SimpleNamespace(future=lambda: done)
+
+
+def test_a_sweep_sends_its_grid_to_ray_once(monkeypatch):
+    ray = types.ModuleType("ray")
+    ray.calls, ray.puts = [], []
+    ray.put = lambda thing: ray.puts.append(thing) or {"stored": thing}
+    ray.remote = lambda *function, **options: Remote(ray, *function) if function else lambda one: Remote(ray, one)
+    monkeypatch.setitem(sys.modules, "ray", ray)
+    ask = {"grid": {"kp": np.linspace(50, 500, 20)}, "metric": "final_error", "duration": 0.1, "piece": 3}
+    for executor in [pendularm.RayExecutor(), pendularm.RayExecutor(num_cpus=1)]:
+        found = pendularm.sweep(executor=executor, **ask)
+        assert np.array_equal(found["final_error"], pendularm.sweep(**ask)["final_error"])
+    assert len(ray.puts) == 2
+    assert len(ray.calls) == 14
+    assert all(isinstance(question, dict) for question, *_ in ray.calls)
+
+
+def test_a_sweep_on_ray_has_the_same_bits():
+    ray = pytest.importorskip("ray")
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
+    try:
+        ask = {"grid": {"kp": np.linspace(50, 500, 40)}, "metric": "final_error", "duration": 0.2, "piece": 5}
+        found = pendularm.sweep(executor=pendularm.RayExecutor(num_cpus=1), **ask)
+        assert np.array_equal(found["final_error"], pendularm.sweep(**ask)["final_error"])
+    finally:
+        ray.shutdown()

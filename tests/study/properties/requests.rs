@@ -1,0 +1,160 @@
+//! Every computation of the study ends within a bound on its pieces, whatever numbers a request has.
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::protocol::catalog::Service;
+use pendularm::protocol::op::Arguments;
+use pendularm::services::Callable;
+use pendularm::services::study::{
+    Computed, PlanRun, PredictStability, Present, RunOffline, SuggestGains, Work as _,
+};
+use pendularm::study::control_loop::ControlLoop;
+use serde_json::value::RawValue;
+use serde_json::{Value, json};
+
+use super::{Dice, Tally, cases, property, run};
+
+/// Most pieces of a computation. A search over all poses of three links has some 10,000, and a search of gains has up
+/// to 144 of them.
+const MOST_PIECES: u64 = 40_000;
+/// Five motions of 200 million coefficients, at 2000 in a piece.
+const MOST_PIECES_OF_ROLLOUTS: u64 = 500_000;
+const MOST_PIECES_OF_GAINS: u64 = 144 * 10_000;
+
+/// Numbers at the ends of the range, in between, and those that are refused.
+const SPECIAL: [&str; 18] = [
+    "5e-324",
+    "1e-320",
+    "2.3e-308",
+    "1e-300",
+    "1e-154",
+    "1e-30",
+    "1e-12",
+    "1e-3",
+    "1",
+    "1e3",
+    "1e12",
+    "1e30",
+    "1e149",
+    "1e300",
+    "1.7976931348623157e308",
+    "0",
+    "-0.0",
+    "1e999",
+];
+
+fn special(dice: &mut Dice) -> &'static str {
+    SPECIAL[dice.0.usize(0..SPECIAL.len())]
+}
+
+/// A request with numbers of its own for some of its fields, as text: no type of JSON holds them all.
+fn arguments<const N: usize>(dice: &mut Dice, service: Service, usual: &Value) -> String {
+    let array = |dice: &mut Dice| {
+        let one = dice.one_in(2).then(|| special(dice));
+        let entries: Vec<_> = (0..N)
+            .map(|_| one.unwrap_or_else(|| special(dice)))
+            .collect();
+        format!("[{}]", entries.join(","))
+    };
+    let mut members = Vec::new();
+    let names = service.fields().iter().map(|field| field.name);
+    for name in names {
+        let is_changed = dice.one_in(3);
+        let text = match (name, is_changed) {
+            ("integrator", _) => format!(
+                "\"{}\"",
+                ["euler", "midpoint", "verlet", "rk4"][dice.0.usize(0..4)]
+            ),
+            ("controller" | "reference", _) => dice.0.bool().to_string(),
+            ("delay", true) => dice.0.bool().to_string(),
+            ("samples", true) => "2".to_owned(),
+            ("params", true) => format!(
+                r#"{{"gravity":{},"masses":{},"lengths":{}}}"#,
+                special(dice),
+                array(dice),
+                array(dice)
+            ),
+            ("gains", true) => format!(
+                r#"{{"kp":{},"ki":{},"kd":{}}}"#,
+                array(dice),
+                array(dice),
+                array(dice)
+            ),
+            ("q" | "qd" | "q0" | "qdot0" | "setpoint", true) => array(dice),
+            (_, true) => special(dice).to_owned(),
+            (name, false) => match usual.get(name) {
+                Some(value) => value.to_string(),
+                None => continue,
+            },
+        };
+        members.push(format!("\"{name}\":{text}"));
+    }
+    format!("{{{}}}", members.join(","))
+}
+
+/// The number of pieces of a computation; `None` if the request is refused.
+fn pieces<const N: usize, T: Callable + Computed<N>>(service: Service, text: &str) -> Option<u64> {
+    let raw = RawValue::from_string(text.to_owned()).unwrap();
+    let ask = T::read(service, &Arguments::from(raw)).ok()?;
+    let setpoint = Setpoint::at([0.3; N]);
+    let present = Present {
+        control: ControlLoop::new(Arm::default(), Gains::<N>::default(), setpoint),
+        state: State::rest(),
+    };
+    let mut work = ask.work(present);
+    let mut pieces = 1;
+    let most = match service {
+        Service::SuggestGains => MOST_PIECES_OF_GAINS,
+        Service::Rollout => MOST_PIECES_OF_ROLLOUTS,
+        _ => MOST_PIECES,
+    };
+    while work.advance(|| std::time::Duration::ZERO).is_none() {
+        pieces += 1;
+        assert!(pieces < most, "{} {text}", service.name());
+    }
+    Some(pieces)
+}
+
+fn any_request_ends<const N: usize>(case: u64, tally: &mut Tally) {
+    let mut dice = Dice::of(case);
+    let usual = json!({"error": 0.01, "duration": 0.05, "timestep": 0.01, "samples": 6, "settling_time": 8.0});
+    // A search of gains takes as long as a hundred other requests.
+    let service = match dice.0.u32(0..100) {
+        0 => Service::SuggestGains,
+        1..10 => Service::Stability,
+        10..40 => Service::Rollout,
+        _ => Service::Plan,
+    };
+    let text = arguments::<N>(&mut dice, service, &usual);
+    let ended = match service {
+        Service::Stability => pieces::<N, PredictStability<N>>(service, &text),
+        Service::Rollout => pieces::<N, RunOffline<N>>(service, &text),
+        Service::Plan => pieces::<N, PlanRun<N>>(service, &text),
+        _ => pieces::<N, SuggestGains<N>>(service, &text),
+    };
+    match ended {
+        Some(_) => tally.tried += 1,
+        None => tally.open += 1,
+    }
+}
+
+#[test]
+fn every_request_of_the_study_ends() {
+    let tally = property!(any_request_ends, 40, 100_000);
+    assert!(tally.tried > tally.open / 8, "{tally:?}");
+}
+
+/// Found by hand: a period of no length, and one beyond every duration.
+#[test]
+fn a_plan_with_a_period_that_cannot_be_counted_is_refused() {
+    for text in [
+        r#"{"error":0.1,"controller":true,"control_period":5e-324}"#,
+        r#"{"error":0.1,"duration":5e-324,"controller":true,"control_period":5e-324}"#,
+        r#"{"error":0.1,"gains":{"kp":[1e-300,1e-300]},"params":{"gravity":0},"control_period":1e149}"#,
+    ] {
+        assert!(
+            pieces::<2, PlanRun<2>>(Service::Plan, text).unwrap() < 1000,
+            "{text}"
+        );
+    }
+}
