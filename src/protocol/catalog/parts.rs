@@ -106,6 +106,7 @@ pub(super) const TYPES: &[Type] = types! {
         "float64 frequency  # Hz",
         "int64 joint",
     ],
+    "pendularm_interfaces/msg/Divergence": ["uint64 step", "float64 time  # s"],
     "rcl_interfaces/msg/Parameter": ["string name", "rcl_interfaces/msg/ParameterValue value"],
     "rcl_interfaces/msg/ParameterValue": [
         "uint8 type",
