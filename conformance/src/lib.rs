@@ -11,6 +11,7 @@
 //! | [`run`] | what the connections of a run share |
 //! | [`rules`] | the checks |
 //! | [`launch`] | a server that the suite starts itself |
+//! | [`mistakes`] | usual mistakes as models, for the cause of a wrong answer |
 //! | [`report`], [`export`] | the results for a reader, and for programs |
 //! | [`command`] | a whole run |
 
@@ -20,18 +21,20 @@ pub mod command;
 pub mod export;
 pub mod launch;
 pub mod method;
+pub mod mistakes;
 pub mod peer;
 pub mod report;
 pub mod rules;
 pub mod run;
 pub mod values;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use bench::{Bench, Found};
+use mistakes::{Diagnosis, Subject};
 use run::{Frame, PATIENCE, Run};
 use serde_json::{Value, json};
 
@@ -199,7 +202,7 @@ pub fn run(address: &str, selection: &Selection, mut tell: impl FnMut(&Row, usiz
     }
     let rules = selection.rules(found.links);
     let mut watch = Watch::start(address, &run);
-    let (mut rows, mut notes) = (Vec::new(), BTreeSet::new());
+    let (mut rows, mut notes, mut causes) = (Vec::new(), BTreeSet::new(), BTreeMap::new());
     for rule in &rules {
         if run.is_ending() {
             notes.insert(format!("interrupted before {}: {} of {} rules were tried", rule.id, rows.len(), rules.len()));
@@ -233,7 +236,13 @@ pub fn run(address: &str, selection: &Selection, mut tell: impl FnMut(&Row, usiz
         notes.extend(watch.looked(rule, &run));
         let (needs, frames) = run.take();
         let frames = if got.is_ok() { Vec::new() } else { frames };
-        let row = Row { is_aside, needs, frames, time: start.elapsed(), ..Row::of(*rule, got) };
+        let subject = Subject::of(rule.id).filter(|_| got.is_err() && !is_aside && began.elapsed() < selection.time);
+        let known = subject.map(|subject| {
+            let ask = || Bench::prepared(address, &found, &run).and_then(|mut bench| subject.diagnose(&mut bench)).ok();
+            causes.entry(subject).or_insert_with(ask).clone()
+        });
+        let Diagnosis { cause, plot } = known.flatten().unwrap_or_default();
+        let row = Row { cause, plot, is_aside, needs, frames, time: start.elapsed(), ..Row::of(*rule, got) };
         tell(&row, rules.len());
         rows.push(row);
     }

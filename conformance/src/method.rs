@@ -40,7 +40,7 @@ pub(crate) fn plus(left: &[f64], factor: f64, right: &[f64]) -> Vec<f64> {
 }
 
 /// The weights 1:2:2:1.
-pub(crate) fn blend(one: &[f64], two: &[f64], three: &[f64], four: &[f64]) -> Vec<f64> {
+fn blend(one: &[f64], two: &[f64], three: &[f64], four: &[f64]) -> Vec<f64> {
     let inner = plus(two, 1.0, three);
     let outer = plus(one, 1.0, four);
     plus(&outer, 2.0, &inner).iter().map(|sum| sum / 6.0).collect()

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::mistakes::Subject;
 use crate::{CATEGORIES, Results, Row};
 
 /// The longest line.
@@ -81,8 +82,10 @@ pub fn paragraph(row: &Row) -> String {
     let mut text = line(row);
     text += &wrapped("     expected: ", row.rule.expected);
     text += &wrapped("     got: ", got);
-    if let Some(cause) = &row.cause {
-        text += &wrapped("     cause: ", cause);
+    match &row.cause {
+        Some(cause) => text += &wrapped("     cause: ", cause),
+        None if Subject::of(row.rule.id).is_some() => text += "     cause: no known mistake\n",
+        None => {}
     }
     text
 }
