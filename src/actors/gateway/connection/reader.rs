@@ -16,7 +16,6 @@ use bytes::BytesMut;
 use tokio::time::Instant;
 
 use super::client::Connection;
-use super::deadlines::unless_closed;
 use super::transport::{ClientLost, ClientStream};
 use crate::actors::ConnectionId;
 use crate::actors::compute::long_frames::{LongFrame, LongFrames, Parsed};
@@ -25,6 +24,7 @@ use crate::actors::gateway::registry::{Handled, Request, Retire};
 use crate::actors::resources::long_work::SHORT_WORK;
 use crate::actors::resources::memory::{Permit, time_to_read};
 use crate::actors::resources::turns::{Timer, end_turn};
+use crate::actors::resources::unread::unless_closed;
 use crate::protocol::catalog::Service;
 use crate::protocol::limits::{MAX_FRAME, SHORT};
 use crate::protocol::op::{self, CallService, Compression, Incoming, Op, Problem, Subscribe};
