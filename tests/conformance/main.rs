@@ -1,6 +1,7 @@
 //! The suite of the specification against this program: every rule holds, and every rule can fail.
 
 #![allow(
+    clippy::cast_possible_truncation,
     clippy::expect_used,
     clippy::indexing_slicing,
     clippy::panic,
