@@ -36,6 +36,14 @@ pub fn read_url(text: &str) -> Option<String> {
 #[must_use]
 pub fn read(text: &str) -> Option<String> {
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|one| one.is_ascii_digit());
+    if let Ok(address) = text.parse::<Ipv6Addr>() {
+        // Without brackets, `::1:9095` may be an address, or another one with a port.
+        let (rest, _) = text.rsplit_once(':')?;
+        return match rest.parse::<Ipv6Addr>() {
+            Ok(_) => None,
+            Err(_) => Some(format!("[{address}]:{PORT}")),
+        };
+    }
     let (host, port) = match text.rsplit_once(':') {
         Some((host, port)) if is_number(port) => (host, port.parse().ok()?),
         _ if is_number(text) => ("", text.parse().ok()?),
@@ -159,6 +167,9 @@ mod tests {
             ("127.0.0.1", "127.0.0.1:9095"),
             ("LocalHost:80", "localhost:80"),
             ("[::1]", "[::1]:9095"),
+            ("::1", "[::1]:9095"),
+            ("ws://::1/", "[::1]:9095"),
+            ("FE80::1", "[fe80::1]:9095"),
             ("[::1]:9096/", "[::1]:9096"),
             ("ws://127.0.0.1:9096/", "127.0.0.1:9096"),
             ("http://arm.example?token=secret", "arm.example:9095"),
@@ -174,7 +185,8 @@ mod tests {
             "localhost:",
             "localhost:x",
             "localhost:+80",
-            "::1",
+            "::1:9095",
+            "fe80::1:2",
             "[::1",
             "[::g]:80",
             "https://a:80",

@@ -9,10 +9,12 @@ use clap::Args;
 use crate::math::arm::{Arm, State};
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::shown::Shown;
+use crate::math::simulation::ControlPeriod;
 use crate::study::control_loop::ControlLoop;
 use crate::study::paused::at_once;
 use crate::study::planner::{self, MAX_DURATION, PlanError, Planned, Task};
-use crate::value::{Links, ValueReader, needed, read_links};
+pub use crate::value::Links;
+use crate::value::{ValueReader, needed, read_links};
 
 /// Default duration of a free swing \[s\].
 const SWING: f64 = 10.0;
@@ -45,11 +47,34 @@ pub struct PlanOptions {
     #[arg(long, value_name = "RADIANS", value_delimiter = ',')]
     #[arg(allow_hyphen_values = true, value_parser = ValueReader(read_angle))]
     pub setpoint: Vec<f64>,
+    /// Positions of the joints at the start, in rad, separated by commas; 0 by default
+    #[arg(long = "q", value_name = "RADIANS", value_delimiter = ',')]
+    #[arg(allow_hyphen_values = true, value_parser = ValueReader(read_angle))]
+    pub position: Vec<f64>,
+    /// Velocities of the joints at the start, in rad/s, separated by commas; 0 by default
+    #[arg(long = "qd", value_name = "RADIANS", value_delimiter = ',')]
+    #[arg(allow_hyphen_values = true, value_parser = ValueReader(read_angle))]
+    pub velocity: Vec<f64>,
+    /// Time between two runs of the control law, in s; planned by default
+    #[arg(long, value_name = "SECONDS", requires = "controller")]
+    #[arg(value_parser = ValueReader(read_positive))]
+    pub control_period: Option<f64>,
+    /// Apply each effort one control period late
+    #[arg(long, requires = "controller")]
+    pub delay: bool,
 }
 
 impl PlanOptions {
     /// Checks the options against each other.
     pub(crate) fn checked(mut self) -> Result<Self, String> {
+        for (name, given) in [("q", &self.position), ("qd", &self.velocity)] {
+            if !given.is_empty() && given.len() != self.links.count() {
+                let joints = given.len();
+                return Err(format!(
+                    "--{name} must be a number for each joint, got {joints}"
+                ));
+            }
+        }
         let joints = self.setpoint.len();
         if joints == 0 {
             self.setpoint = vec![0.8, -0.6, 0.0];
@@ -78,16 +103,25 @@ pub fn run(options: &PlanOptions) -> Result<String, PlanError> {
 
 fn plan<const N: usize>(options: &PlanOptions, gains: Gains<N>) -> Result<String, PlanError> {
     let arm = Arm::<N>::default();
-    let joint = |i: usize| options.setpoint.get(i).copied().unwrap_or_default();
-    let (control, usual) = if options.controller {
-        let setpoint = Setpoint::at(std::array::from_fn(joint));
+    let joints = |given: &[f64]| -> [f64; N] {
+        std::array::from_fn(|i| given.get(i).copied().unwrap_or_default())
+    };
+    let (mut control, usual) = if options.controller {
+        let setpoint = Setpoint::at(joints(&options.setpoint));
         (ControlLoop::new(arm, gains, setpoint), MOVE)
     } else {
         (ControlLoop::free(arm), SWING)
     };
+    control.period = ControlPeriod {
+        period: options.control_period.unwrap_or_default(),
+        delay: options.delay,
+    };
     let task = Task {
         control,
-        start: State::rest(),
+        start: State {
+            position: joints(&options.position),
+            velocity: joints(&options.velocity),
+        },
         duration: options.duration.unwrap_or(usual),
         error: options.error,
     };
@@ -102,7 +136,7 @@ fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {
         ..
     } = task;
     let kind = if control.is_free() {
-        "swinging freely from the starting pose".to_owned()
+        "swinging freely".to_owned()
     } else {
         format!("under control to {:?} rad", control.setpoint.position)
     };
@@ -112,10 +146,10 @@ fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(
             out,
-            "  {:<9} timestep {:.4e} s  {:>9.1} evaluations/s  error {:.2e} m",
+            "  {:<9} timestep {:.4e} s  {:>9} evaluations/s  error {:.2e} m",
             one.method.name(),
             one.timestep,
-            f64::from(one.method.evaluations()) / one.timestep,
+            rate(f64::from(one.method.evaluations()) / one.timestep),
             one.error
         );
     }
@@ -123,7 +157,8 @@ fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {
     let period = if control.is_free() {
         String::new()
     } else {
-        format!(", control period {:.4e} s", best.timestep)
+        let given = Some(control.given_period()).filter(|given| *given > 0.0);
+        format!(", control period {:.4e} s", given.unwrap_or(best.timestep))
     };
     let _ = writeln!(
         out,
@@ -134,6 +169,15 @@ fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {
         planned.uncertainty
     );
     out
+}
+
+/// Evaluations per second, with an exponent if there are too many digits for a column.
+fn rate(rate: f64) -> String {
+    if rate < 1e7 {
+        format!("{rate:.1}")
+    } else {
+        Shown(rate).to_string()
+    }
 }
 
 fn read_positive(text: &str) -> Result<f64, String> {

@@ -4,6 +4,7 @@
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
+use pendularm::math::limits::Limits;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::{Checkpoint, ControlPeriod, Held, Simulation};
 use pyo3::prelude::{PyErr, PyResult, Python};
@@ -205,6 +206,8 @@ impl Reader<'_> {
             integral,
             enabled,
             held,
+            // The library sets neither limits nor friction.
+            limits: Limits::default(),
             method,
             timestep,
             state: State {

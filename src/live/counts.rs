@@ -77,6 +77,10 @@ impl Counts {
         }
     }
 
+    pub(crate) const fn wants_any(&self) -> bool {
+        !self.wanted.is_empty()
+    }
+
     pub(crate) fn wants(&self, topic: Topic) -> bool {
         self.wanted.contains(&topic)
     }

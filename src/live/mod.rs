@@ -44,6 +44,8 @@ pub use self::steps::StepsAsked;
 
 /// Publishing ticks per second: the rate of `/joint_states` and `/clock` \[Hz\].
 pub const PUBLISH_RATE: u32 = 60;
+/// Ticks between two wake-ups of an arm that nothing observes.
+pub const REST_TICKS: u64 = 6;
 /// Most time of one wake-up for steps. A message to the arm may have to wait so long.
 pub const WAKE_UP_BUDGET: Duration = Duration::from_millis(5);
 /// Pause between two wake-ups while steps are due. So the arm can use most of its core, independent of the
@@ -146,6 +148,12 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     pub fn set_wanted(&mut self, topic: Topic, wanted: bool) {
         self.counts.set_wanted(topic, wanted);
         self.publish_lasting(topic);
+    }
+
+    /// Whether anything observes the arm: a subscriber of a topic, a goal or a record.
+    #[must_use]
+    pub fn is_observed(&self) -> bool {
+        self.counts.wants_any() || self.goals.is_tracked() || self.journal.is_some()
     }
 
     /// Takes due steps within one wake-up's budget. Returns `true` if steps remain: the caller then calls

@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use super::counts::{WakeUp, energy};
-use super::{LiveArm, Obstacle, PUBLISH_RATE, World};
+use super::{LiveArm, Obstacle, PUBLISH_RATE, REST_TICKS, World};
 use crate::math::arm::State;
 use crate::math::pacer::CATCH_UP;
 use crate::math::shown::Shown;
@@ -26,6 +26,20 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         self.watch_warnings();
         self.publish_state();
         self.tell_state();
+    }
+
+    /// Counts ticks at which there was nothing to publish.
+    pub const fn skip_ticks(&mut self, count: u64) {
+        self.counts.ticks += count;
+    }
+
+    /// The number of ticks until the next one at which the arm must wake.
+    #[must_use]
+    pub fn ticks_to_wake(&self) -> u64 {
+        match self.is_observed() {
+            true => 1,
+            false => REST_TICKS - self.counts.ticks % REST_TICKS,
+        }
     }
 
     fn publish_state(&mut self) {

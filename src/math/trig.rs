@@ -134,7 +134,8 @@ fn upper<T: Number>(p: [f64; 6], r2: T, r4: T) -> T {
     (r2 * p[3] + p[2]) + r4 * (r2 * p[5] + p[4])
 }
 
-/// The C library's sine and cosine if the angle is beyond the limit or not finite.
+/// The sine and cosine of the `libm` crate, which is the same on every platform, if the angle is beyond the limit or not
+/// finite.
 #[cold]
 #[inline(never)]
 fn replaced_far<T: Number, const N: usize>(
@@ -146,7 +147,7 @@ fn replaced_far<T: Number, const N: usize>(
         for lane in 0..T::LANES {
             let angle = angles[i].lane(lane);
             if angle.abs() > LIMIT || angle.is_nan() {
-                let (sine, cosine) = angle.sin_cos();
+                let (sine, cosine) = libm::sincos(angle);
                 sin[i].set_lane(lane, sine);
                 cos[i].set_lane(lane, cosine);
             }

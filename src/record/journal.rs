@@ -205,11 +205,8 @@ impl<const N: usize> Noted for Limits<N> {
 impl<const N: usize> Noted for Arm<N> {
     fn write(&self) -> Value {
         let (masses, lengths) = (self.masses().write(), self.lengths().write());
-        let mut written = json!({"gravity": self.gravity(), "masses": masses, "lengths": lengths});
-        if self.has_friction() {
-            written["viscous"] = self.viscous().write();
-        }
-        written
+        let viscous = self.has_friction().then(|| self.viscous().write());
+        json!({"gravity": self.gravity(), "masses": masses, "lengths": lengths, "viscous": viscous})
     }
 
     fn read(_: &'static str, from: &Value) -> Result<Self, NoteError> {

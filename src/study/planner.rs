@@ -189,6 +189,10 @@ impl<const N: usize> StepTrial for &mut MethodTrials<'_, N> {
     async fn is_enough(&mut self, steps: u64) -> bool {
         let (reference, method) = (self.reference, self.control.method);
         let timestep = reference.whole / in_f64(steps);
+        // The parts of a duration of 1e-323 s are zero.
+        if timestep <= 0.0 {
+            return false;
+        }
         let control = self.control.with_timestep(timestep);
         let live = Box::new(control.simulation(reference.task.start));
         let allowed = reference.task.error - reference.uncertainty;

@@ -264,10 +264,11 @@ impl<const N: usize> Rollout<N> {
         }
     }
 
-    /// The largest error of a deviation of this run and its uncertainty \[rad\], if they are known for all samples. An
-    /// error over some of the samples is not comparable with that of another run.
+    /// The largest error of a deviation of this run and its uncertainty \[rad\], if they are known for all samples and the
+    /// run did not diverge. An error over some of the samples is not comparable with that of another run.
     pub fn known(&self, deviation: Option<&Deviation>) -> (Option<f64>, Option<f64>) {
-        let whole = deviation.filter(|deviation| deviation.samples == self.times.len());
+        let whole = deviation
+            .filter(|deviation| deviation.samples == self.times.len() && self.divergence.is_none());
         let uncertainty = whole.map(|deviation| deviation.uncertainty);
         (whole.and_then(Deviation::known), uncertainty)
     }

@@ -13,9 +13,6 @@ use crate::math::integrator::Method;
 /// Most stages of a method.
 pub const MAX_STAGES: usize = 12;
 
-/// Largest difference of a sum of coefficients from its value that counts as rounding of the coefficients.
-pub const ROUNDED: f64 = 1e-10;
-
 /// Largest coefficient. Textbook methods have coefficients below 100.
 const LARGEST: f64 = 1e6;
 

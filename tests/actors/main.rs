@@ -5,6 +5,7 @@
     reason = "test programs that share helpers need not use every part"
 )]
 
+mod arm_rest;
 mod arm_steps;
 mod arm_turns;
 #[path = "../support/askers.rs"]

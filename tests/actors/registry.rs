@@ -12,8 +12,9 @@ use std::time::Duration;
 use crate::stage::Stage;
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, route, settle, stand_in};
-use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::gateway::registry::{Connect, Nodes, Outlets, ToClient};
 use pendularm::actors::node::{Interest, Publish, TopicMessage};
+use pendularm::actors::resources::gone::Gone;
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages;
 use serde_json::json;
@@ -53,6 +54,28 @@ fn a_node_is_notified_of_the_first_subscriber_and_of_the_end_of_the_last() {
         let mut ended = received.borrow().clone();
         ended.sort_unstable();
         assert_eq!(ended, [(Topic::JointStates, false), (Topic::Clock, false)]);
+    });
+}
+
+#[test]
+fn a_place_that_nobody_receives_is_free_again() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let outlets = Outlets {
+            mailbox: stand_in(|_: ToClient| {}),
+            backlog: Arc::default(),
+            gone: Gone::default(),
+        };
+        let answer = gateway.registry.send(Connect {
+            outlets,
+            from: [127, 0, 0, 1].into(),
+            may_use_kept: false,
+        });
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 1);
+        drop(answer);
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 0);
     });
 }
 

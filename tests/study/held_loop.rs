@@ -12,7 +12,7 @@ use pendularm::study::linear::Linear;
 use pendularm::study::matrix::Matrix;
 use pendularm::study::paused::at_once;
 use pendularm::study::stability::Stepping;
-use pendularm::study::tableau::Pair;
+use pendularm::study::tableau::{Pair, Tableau};
 
 type Rows = Vec<Vec<f64>>;
 
@@ -704,4 +704,36 @@ fn a_wrong_gain_is_refused_by_name() {
             "the loop must have at most 256 states, got 320",
         ),
     ]);
+}
+
+/// Heun's method by its tableau has the limit of the midpoint method, which has the same stability polynomial.
+#[test]
+fn a_method_of_ones_own_is_given_by_its_tableau() {
+    let heun = Tableau::new(&[vec![0.0, 0.0], vec![1.0, 0.0]], &[0.5, 0.5]).unwrap();
+    let with = |between| Given {
+        stiffness: vec![vec![90.0]],
+        damping: vec![vec![0.4]],
+        between,
+        steps: 3,
+        ..joint(60.0, 4.0)
+    };
+    let found = answer(
+        &with(Between::Explicit(Box::new(Pair::same(heun.clone())))),
+        None,
+    );
+    let midpoint = answer(&with(explicit(Method::Midpoint)), None);
+    let (one, other) = (found.period_limit.unwrap(), midpoint.period_limit.unwrap());
+    assert!(is_near(one, other, 1e-9), "{one} {other}");
+    let refused = |a: &[Vec<f64>], b: &[f64]| Tableau::new(a, b).unwrap_err().to_string();
+    let implicit = refused(&[vec![0.0, 0.0], vec![0.5, 0.5]], &[0.5, 0.5]);
+    assert!(
+        implicit.contains("row 1 of a is implicit: a[1][1] is 0.5"),
+        "{implicit}"
+    );
+    assert!(refused(&vec![vec![0.0; 13]; 13], &[1.0; 13]).contains("1 to 12 stages, got 13"));
+    assert!(refused(&[vec![]], &[f64::NAN]).contains("got NaN"));
+    assert!(refused(&[vec![]], &[0.5, 0.5]).contains("as many rows as b has entries, 2, got 1"));
+    assert!(refused(&[vec![], vec![]], &[0.5, 0.5]).contains("row 1 of a must have 1 to 2"));
+    let euler = Tableau::new(&[vec![]], &[1.0]).unwrap();
+    assert!(Pair::new(heun, euler).is_err());
 }

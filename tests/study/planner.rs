@@ -174,3 +174,34 @@ fn a_run_that_diverges_is_infinitely_far_off_however_far_is_allowed() {
         assert!(at_once(off).is_infinite());
     }
 }
+
+/// The program's text for a plan: its numbers are short, and it starts in the given state with the given clocks.
+#[test]
+fn the_text_of_a_plan_has_short_numbers() {
+    use pendularm::plan::{Links, PlanOptions, run};
+    let options = PlanOptions {
+        error: 0.1,
+        controller: false,
+        duration: Some(1e-300),
+        links: Links::Two,
+        setpoint: vec![],
+        position: vec![],
+        velocity: vec![],
+        control_period: None,
+        delay: false,
+    };
+    let text = run(&options).unwrap();
+    assert!(text.lines().all(|line| line.len() < 160), "{text}");
+    let text = run(&PlanOptions {
+        error: 0.01,
+        controller: true,
+        duration: Some(0.1),
+        setpoint: vec![0.3, 0.2],
+        position: vec![0.2, 0.1],
+        control_period: Some(0.002),
+        delay: true,
+        ..options
+    })
+    .unwrap();
+    assert!(text.contains("control period 2.0000e-3 s"), "{text}");
+}

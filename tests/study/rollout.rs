@@ -169,7 +169,35 @@ fn a_run_that_diverges_ends_with_its_last_finite_sample() {
     assert!(made.divergence.is_some());
     assert!(made.times.len() < 1001);
     assert!(made.positions.iter().flatten().all(|q| q.is_finite()));
-    assert!(made.deviation.unwrap().samples <= made.times.len());
+}
+
+/// The reference of a stiff loop is known up to the step that diverges, so only the divergence tells that the error is
+/// not that of the whole run. In the second run it is the last step, and all samples but the last are there.
+#[test]
+fn a_run_that_diverges_has_no_error() {
+    let request = RolloutRequest {
+        start: State::rest(),
+        samples: MAX_SAMPLES,
+        ..controlled(Gains::default(), 0.016)
+    };
+    let whole = run(RolloutRequest {
+        duration: 1.0,
+        ..request
+    });
+    let lost = whole.divergence.unwrap();
+    assert_eq!(whole.steps + 1, lost.step);
+    let last = run(RolloutRequest {
+        duration: lost.step as f64 * 0.016,
+        ..request
+    });
+    assert_eq!(last.divergence, Some(lost));
+    assert_eq!(last.times.len() as u64, lost.step);
+    for made in [whole, last] {
+        for deviation in [made.deviation, made.from_ideal] {
+            assert_eq!(made.known(deviation.as_ref()), (None, None));
+        }
+        assert!(made.deviation.unwrap().error > 0.0);
+    }
 }
 
 /// `tests/actors/refusals/rows.txt` has the other refusals.

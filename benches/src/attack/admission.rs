@@ -60,7 +60,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "report-readers",
-        "64 clients read 100 bytes of a report's file of 8 MB ten times a second",
+        "64 clients read 100 bytes of a report's file of 3.9 MB ten times a second",
         || {
             Client::http("GET /report/large.csv")
                 .says_bytes(END)

@@ -10,9 +10,9 @@ from importlib.metadata import version as _version
 
 from . import dynamics
 from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
-from .held import HeldLimit, HeldMode, held_limit
 from ._page import Page, page
 from ._ray import RayExecutor
+from .held import HeldLimit, HeldMode, held_limit
 from .report import read_report
 from .scores import score, submission
 from .study import Critical, Plan, Rollout, Stability, SuggestedGains, plan, rollout, stability, suggest_gains

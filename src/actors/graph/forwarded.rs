@@ -110,12 +110,9 @@ impl ForwardedRequests {
             }
         };
         let request = self.outstanding.get(&number)?;
-        let is_late = request
-            .deadline
-            .is_some_and(|deadline| Instant::now() > deadline);
         let is_meant = id.is_some() || name.is_none_or(|name| names::are_same(&request.name, name));
         let is_theirs = request.provider == provider && request.kind == kind;
-        (is_theirs && is_meant && !is_late).then_some(number)
+        (is_theirs && is_meant).then_some(number)
     }
 
     /// Removes and returns the request that [`find_answered`](Self::find_answered) finds.

@@ -10,6 +10,8 @@ use std::time::Duration;
 
 use tokio::time::sleep;
 
+use super::gone::Gone;
+
 #[cfg(target_os = "linux")]
 use self::sockets::value;
 
@@ -70,6 +72,16 @@ fn unread(ends: Ends) -> Option<usize> {
 pub async fn closed(ends: Ends) {
     while value(ends.peer, ends.local, INODE) != Some(0) {
         sleep(CLOSED_CHECK).await;
+    }
+}
+
+/// Waits until an op has taken effect that may wait for memory, since nothing is read meanwhile. If the client has closed
+/// its socket, the op is told, and its effect is not waited for.
+pub async fn unless_closed(effect: impl Future<Output = ()>, gone: Gone, ends: Ends) {
+    tokio::select! {
+        biased;
+        () = effect => {}
+        () = closed(ends) => gone.set(),
     }
 }
 

@@ -25,15 +25,20 @@ impl<const N: usize> Simulation<N> {
         partition_point(steps, |step| self.time_after(step + 1).is_finite())
     }
 
-    /// Changes the length of a step \[s\], greater than 0, from the next step on. A control period begins with that
+    /// Changes the length of a step \[s\] from the next step on. Returns `false`, and changes nothing, if it is not finite
+    /// and greater than 0. A control period begins with that
     /// step. Time continues from its present value. The present timestep changes nothing, so repeating it does not turn
     /// time into a running sum.
-    pub fn set_timestep(&mut self, timestep: f64) {
+    pub fn set_timestep(&mut self, timestep: f64) -> bool {
+        if !timestep.is_finite() || timestep <= 0.0 {
+            return false;
+        }
         if timestep.to_bits() != self.timestep.to_bits() {
             self.base = self.time();
             self.steps_since_base = 0;
             self.timestep = timestep;
             self.hold.begin_period(timestep, |_| ());
         }
+        true
     }
 }

@@ -60,7 +60,9 @@ impl<const N: usize> Simulation<N> {
     pub fn apply(&mut self, input: ArmInput<N>) {
         match input {
             ArmInput::Method(method) => self.set_method(method),
-            ArmInput::Timestep(timestep) => self.set_timestep(timestep),
+            ArmInput::Timestep(timestep) => {
+                self.set_timestep(timestep);
+            }
             ArmInput::Arm(arm) => self.set_arm(arm),
             ArmInput::Gains(gains) => self.set_gains(gains),
             ArmInput::Enabled(on) => self.enable(on),

@@ -155,15 +155,31 @@ impl<const N: usize> Simulation<N> {
         if self.divergence.is_some() {
             return 0;
         }
+        // A function of its own, so the compiler makes the same code as without friction of the steps below.
+        if self.arm.has_friction() {
+            return self.advance_damped(steps, observe);
+        }
         let with_time = self.steps_with_time(steps);
         // Evaluated once for all steps.
-        let taken = if self.arm.has_friction() {
-            self.take_steps::<true, true>(with_time, observe)
-        } else if leaves_out_first_angle(&self.arm) {
+        let taken = if leaves_out_first_angle(&self.arm) {
             self.take_steps::<false, false>(with_time, observe)
         } else {
             self.take_steps::<true, false>(with_time, observe)
         };
+        self.ended(taken, with_time, steps)
+    }
+
+    /// [`Simulation::advance_with`] of an arm with friction.
+    #[inline(never)]
+    fn advance_damped(&mut self, steps: u64, observe: impl FnMut(&Self) -> ControlFlow<()>) -> u64 {
+        let with_time = self.steps_with_time(steps);
+        let taken = self.take_steps::<true, true>(with_time, observe);
+        self.ended(taken, with_time, steps)
+    }
+
+    /// The number of taken steps, of `steps` of which `with_time` lead to a finite time.
+    #[inline]
+    fn ended(&mut self, taken: ControlFlow<u64>, with_time: u64, steps: u64) -> u64 {
         match taken {
             ControlFlow::Break(taken) => taken,
             ControlFlow::Continue(()) => {

@@ -106,6 +106,7 @@ pub(super) const TYPES: &[Type] = types! {
         "float64 frequency  # Hz",
         "int64 joint",
     ],
+    "pendularm_interfaces/msg/Divergence": ["uint64 step", "float64 time  # s"],
     "pendularm_interfaces/msg/HeldMode": [
         "float64 growth_per_period",
         "float64 frequency  # Hz",

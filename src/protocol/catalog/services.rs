@@ -159,6 +159,9 @@ table! {
                 "pendularm_interfaces/msg/Params params?  # SI",
                 "float64[] setpoint?  # rad",
                 "float64 control_period?  # s",
+                "bool delay?",
+                "float64[] q?  # rad",
+                "float64[] qd?  # rad/s",
             ])
             .response(fields![
                 "float64 control_period_limit  # s",
@@ -222,6 +225,9 @@ table! {
                 "uint64 samples?",
                 "bool reference?",
                 "float64 control_period?  # s",
+                "bool delay?",
+                "float64[] q?  # rad",
+                "float64[] qd?  # rad/s",
             ])
             .response(fields![
                 "float64[] times  # s",
@@ -235,6 +241,7 @@ table! {
                 "float64 error_uncertainty  # rad",
                 "float64 sampling_error  # rad",
                 "float64 sampling_error_uncertainty  # rad",
+                "pendularm_interfaces/msg/Divergence divergence  # s",
             ])
             .computation()
             .null_is_absent(),
@@ -246,6 +253,7 @@ table! {
                 "float64 timestep?  # s",
                 "string integrator?",
                 "pendularm_interfaces/msg/Params params?  # SI",
+                "bool delay?",
             ])
             .response(fields![
                 "float64[] kp  # N m/rad",
@@ -270,6 +278,9 @@ table! {
                 "pendularm_interfaces/msg/Gains gains?  # SI",
                 "float64[] setpoint?  # rad",
                 "float64 control_period?  # s",
+                "bool delay?",
+                "float64[] q?  # rad",
+                "float64[] qd?  # rad/s",
             ])
             .response(fields![
                 "string integrator",

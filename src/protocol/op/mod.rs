@@ -238,6 +238,11 @@ impl<'a> Members<'a> {
         self.values.get(index).copied().flatten()
     }
 
+    /// The value of a field that is present and not `null`.
+    fn given(&self, field: &'static str) -> Option<&'a RawValue> {
+        self.get(field).filter(|raw| raw.get() != "null")
+    }
+
     /// Its operation, one of [`OPS`].
     fn known_op(&self) -> Result<&'static str, Problem> {
         let raw = self.get("op").ok_or(Problem::NoOp)?;

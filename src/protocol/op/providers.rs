@@ -62,9 +62,10 @@ impl Members<'_> {
                 let result = self.boolean("result")?;
                 ProviderOp::Respond {
                     // The values of a failure may be a text with the reason.
-                    values: match result {
-                        true => self.object("values")?,
-                        false => self.required("values")?.into(),
+                    values: match self.given("values") {
+                        Some(_) if result => self.object("values")?,
+                        Some(reason) => reason.into(),
+                        None => Payload::empty_object(),
                     },
                     result,
                     status: self

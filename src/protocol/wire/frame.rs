@@ -54,6 +54,8 @@ pub struct FrameReader {
     pub(super) at: usize,
     pub(super) state: ScanState,
     nesting: Nesting,
+    /// Whether the end of the line after the last frame has not come.
+    is_single: bool,
     /// Longest frame.
     pub(super) limit: usize,
 }
@@ -80,6 +82,7 @@ impl FrameReader {
             at: 0,
             state: ScanState::Between,
             nesting: Nesting::new(),
+            is_single: false,
             limit,
         }
     }
@@ -100,6 +103,7 @@ impl FrameReader {
         self.at += series.frames.len();
         self.start = self.at;
         self.state = ScanState::Between;
+        self.is_single = false;
         Some(series)
     }
 
@@ -124,6 +128,13 @@ impl FrameReader {
     #[must_use]
     pub fn is_unfinished(&self) -> bool {
         matches!(self.state, ScanState::Object | ScanState::Line)
+    }
+
+    /// Whether no line end has come after the last frame. Older raw-TCP clients send none, and need each frame in a
+    /// separate write.
+    #[must_use]
+    pub const fn is_single(&self) -> bool {
+        self.is_single
     }
 
     /// Moves the incomplete frame to the front of the buffer once the finished part is longer: constant time per byte.
@@ -153,7 +164,12 @@ impl FrameReader {
         let rest = self.rest();
         let is_space = |byte: &u8| matches!(byte, b' ' | b'\t' | b'\r' | b'\n');
         let space = rest.iter().position(|byte| !is_space(byte));
-        self.at += space.unwrap_or(rest.len());
+        let space = space.unwrap_or(rest.len());
+        // The line end may come in a packet of its own.
+        if self.is_single && rest.iter().take(space).any(|byte| *byte == b'\n') {
+            self.is_single = false;
+        }
+        self.at += space;
         self.start = self.at;
         match self.buffer.get(self.at) {
             Some(b'{') => {
@@ -190,7 +206,7 @@ impl FrameReader {
     fn take_frame(&mut self) -> RawFrame {
         let rest = self.rest();
         let is_space = |byte: &u8| matches!(byte, b' ' | b'\t' | b'\r');
-        let newline = rest.iter().find(|byte| !is_space(byte)) == Some(&b'\n');
+        let is_single = rest.iter().find(|byte| !is_space(byte)) != Some(&b'\n');
         let length = self.at - self.start;
         let bytes = if length > KEPT_BUFFER && length >= rest.len() {
             // The frame keeps the buffer. The bytes after it are copied, because they are fewer.
@@ -204,10 +220,10 @@ impl FrameReader {
         };
         self.start = self.at;
         self.state = ScanState::Between;
+        self.is_single = is_single;
         RawFrame {
             bytes,
             has_literals: Some(self.nesting.has_literals),
-            newline,
         }
     }
 
@@ -256,7 +272,6 @@ pub struct RawFrame {
     pub(super) bytes: Vec<u8>,
     /// Whether it may contain `NaN` or `Infinity`. `None` for a message, which is not scanned yet.
     pub(super) has_literals: Option<bool>,
-    pub(super) newline: bool,
 }
 
 impl RawFrame {
@@ -265,12 +280,6 @@ impl RawFrame {
     #[allow(clippy::len_without_is_empty, reason = "only a message may be empty")]
     pub const fn len(&self) -> usize {
         self.bytes.len()
-    }
-
-    /// Whether a line end was right after it.
-    #[must_use]
-    pub const fn newline(&self) -> bool {
-        self.newline
     }
 
     /// The text, with `NaN` and `Infinity` [replaced](accept_literals). `None` for a message that has only white space.

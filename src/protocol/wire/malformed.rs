@@ -69,8 +69,6 @@ impl FrameReader {
 pub struct Frame {
     /// The text, as [decoded](super::frame::RawFrame::decode).
     pub text: String,
-    /// Whether a line end was right after it. Older raw-TCP clients send none, and need each frame in a separate write.
-    pub newline: bool,
 }
 
 impl Iterator for FrameReader {
@@ -79,8 +77,7 @@ impl Iterator for FrameReader {
     fn next(&mut self) -> Option<Result<Frame, FrameError>> {
         Some(match self.next_raw()? {
             Ok(frame) => {
-                let newline = frame.newline();
-                let frame = frame.decode()?.map(|text| Frame { text, newline });
+                let frame = frame.decode()?.map(|text| Frame { text });
                 frame.map_err(|(error, _)| error)
             }
             Err((error, _)) => Err(error),

@@ -299,7 +299,6 @@ impl RawFrame {
         Self {
             bytes,
             has_literals: None,
-            newline: true,
         }
     }
 

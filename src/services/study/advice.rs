@@ -4,8 +4,8 @@
 
 use bytes::Bytes;
 
-use super::{Computed, Present, Refused, StudyWork, arm_of, with_period};
-use crate::math::arm::{ArmError, State};
+use super::{Computed, Present, Refused, StudyWork, arm_of, state_of, with_period};
+use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
 use crate::protocol::catalog::Service;
@@ -33,6 +33,8 @@ pub struct SuggestGains<const N: usize> {
     pub method: Option<Method>,
     /// Changed parameters of the arm.
     pub params: Option<SetParams<N>>,
+    /// Whether an effort acts one step late.
+    pub delay: Option<bool>,
 }
 
 impl<const N: usize> Ask for SuggestGains<N> {
@@ -61,9 +63,9 @@ request! {
         /// Whether the present gains apply if the request has none.
         controller: bool = fields.boolean("controller").unwrap_or(false),
         /// Initial positions \[rad\].
-        q0: Option<[f64; N]> = fields.array("q0", Bound::Finite),
+        q: Option<[f64; N]> = super::joints(&mut fields, ["q", "q0"]),
         /// Initial velocities \[rad/s\].
-        qdot0: Option<[f64; N]> = fields.array("qdot0", Bound::Finite),
+        qd: Option<[f64; N]> = super::joints(&mut fields, ["qd", "qdot0"]),
         /// Changed parameters of the arm.
         params: Option<SetParams<N>> = fields.object("params", SetParams::from_fields),
         /// Changed gains.
@@ -72,6 +74,8 @@ request! {
         setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
         /// The control period \[s\]; `None` or 0 to plan it.
         control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
+        /// Whether an effort acts one period late.
+        delay: Option<bool> = super::delay(&mut fields),
     }
 }
 
@@ -95,6 +99,7 @@ impl<const N: usize> Callable for SuggestGains<N> {
             timestep: fields.number("timestep", Bound::Positive),
             method: fields.choice("integrator", &Method::ALL, Method::name),
             params: fields.object("params", SetParams::from_fields),
+            delay: super::delay(&mut fields),
         };
         if let Some(margin) = ask.margin.filter(|margin| *margin < 1.0) {
             fields.refuse("margin", &format_args!("must be at least 1, got {margin}"));
@@ -177,7 +182,7 @@ fn demands<const N: usize>(
         arm,
         method: ask.method.unwrap_or(present.method),
         timestep: ask.timestep.unwrap_or(present.timestep),
-        period: with_period(present.period, Some(0.0)),
+        period: with_period(present.period, Some(0.0), ask.delay),
         ..*present
     };
     let requirements = GainsRequirements {
@@ -222,7 +227,11 @@ fn task<const N: usize>(ask: &PlanRun<N>, present: &Present<N>) -> Result<Task<N
         arm,
         gains: gains.map_or(missing, |gains| gains.applied_to(&missing)),
         setpoint: ask.setpoint.map_or(control.setpoint, Setpoint::at),
-        period: with_period(control.period, Some(ask.control_period.unwrap_or(0.0))),
+        period: with_period(
+            control.period,
+            Some(ask.control_period.unwrap_or(0.0)),
+            ask.delay,
+        ),
         ..*control
     };
     let usual = if control.is_free() {
@@ -232,10 +241,7 @@ fn task<const N: usize>(ask: &PlanRun<N>, present: &Present<N>) -> Result<Task<N
     };
     Ok(Task {
         control,
-        start: State {
-            position: ask.q0.unwrap_or(state.position),
-            velocity: ask.qdot0.unwrap_or(state.velocity),
-        },
+        start: state_of(ask.q, ask.qd, state),
         duration: ask.duration.unwrap_or(usual),
         error: ask.error,
     })

@@ -22,6 +22,7 @@ use super::arm::SetParams;
 use crate::math::arm::State;
 use crate::math::arm::{Arm, ArmError};
 use crate::math::simulation::ControlPeriod;
+use crate::protocol::op::fields::{Bound, Fields};
 use crate::study::control_loop::ControlLoop;
 use crate::study::paused::Paused;
 use crate::study::stability::most_bytes;
@@ -95,11 +96,49 @@ pub struct Present<const N: usize> {
     pub state: State<N>,
 }
 
-/// The present control period, with another length \[s\] if one is given.
-fn with_period(present: ControlPeriod, period: Option<f64>) -> ControlPeriod {
+/// The present control period, with another length \[s\] and delay if they are given.
+fn with_period(present: ControlPeriod, period: Option<f64>, delay: Option<bool>) -> ControlPeriod {
     ControlPeriod {
         period: period.unwrap_or(present.period),
-        ..present
+        delay: delay.unwrap_or(present.delay),
+    }
+}
+
+/// Whether an effort acts one period late: a number of whole periods, 0 or 1, or `false` and `true`.
+fn delay(fields: &mut Fields<'_>) -> Option<bool> {
+    let raw = fields.raw("delay")?;
+    match raw.get() {
+        "false" | "0" => Some(false),
+        "true" | "1" => Some(true),
+        _ => {
+            fields.refuse(
+                "delay",
+                &format_args!("must be 0 or 1 periods, or a boolean"),
+            );
+            None
+        }
+    }
+}
+
+/// Joint values under one of two names; the second one is older.
+fn joints<const N: usize>(
+    fields: &mut Fields<'_>,
+    [name, older]: [&'static str; 2],
+) -> Option<[f64; N]> {
+    let of_older = fields.array(older, Bound::Finite);
+    fields.array(name, Bound::Finite).or(of_older)
+}
+
+/// The state of a request. Given positions without velocities are at rest; otherwise the present arm's count.
+fn state_of<const N: usize>(
+    position: Option<[f64; N]>,
+    velocity: Option<[f64; N]>,
+    present: &State<N>,
+) -> State<N> {
+    let missing = position.map_or(present.velocity, |_| [0.0; N]);
+    State {
+        position: position.unwrap_or(present.position),
+        velocity: velocity.unwrap_or(missing),
     }
 }
 

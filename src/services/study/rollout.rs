@@ -1,7 +1,7 @@
 //! `/study/rollout`: an offline run of the arm, sample by sample, with its cost and its error.
 //!
-//! The run is first made alone and timed with a worker's clock, so `took` is the time of the run alone. If a
-//! reference is requested, the run is repeated beside the reference, which costs far more.
+//! The run is first made with two samples and timed with a worker's clock, so `took` is the time of the steps. Then it is
+//! repeated with all samples, and beside a reference if one is requested, which costs far more.
 //!
 //! **Invariant:** the samples are the live arm's own steps. A run in slices gives the same bits as one without.
 
@@ -10,8 +10,8 @@ use std::time::Duration;
 use bytes::Bytes;
 use serde::{Serialize, Serializer};
 
-use super::{Computed, NUMBER_BYTES, Present, Refused, Work, arm_of, with_period};
-use crate::math::arm::{ArmError, State};
+use super::{Computed, NUMBER_BYTES, Present, Refused, Work, arm_of, state_of, with_period};
+use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
 use crate::protocol::catalog::Service;
@@ -33,16 +33,18 @@ request! {
     /// Runs the arm offline.
     #[derive(Debug, Clone, PartialEq, Default)]
     pub struct RunOffline<N> -> RunAnswer<N>, |fields| {
-        /// Initial positions \[rad\]; 0 by default.
-        q0: Option<[f64; N]> = fields.array("q0", Bound::Finite),
-        /// Initial velocities \[rad/s\]; 0 by default.
-        qdot0: Option<[f64; N]> = fields.array("qdot0", Bound::Finite),
+        /// Initial positions \[rad\].
+        q: Option<[f64; N]> = super::joints(&mut fields, ["q", "q0"]),
+        /// Initial velocities \[rad/s\].
+        qd: Option<[f64; N]> = super::joints(&mut fields, ["qd", "qdot0"]),
         /// Duration \[s\], greater than 0.
         duration: Option<f64> = fields.number("duration", Bound::Positive),
         /// Length of a step \[s\], greater than 0.
         timestep: Option<f64> = fields.number("timestep", Bound::Positive),
         /// The time between two runs of the control law \[s\], not negative; 0 for every step.
         control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
+        /// Whether an effort acts one period late.
+        delay: Option<bool> = super::delay(&mut fields),
         /// The method that takes the steps.
         method: Option<Method> = fields.choice("integrator", &Method::ALL, Method::name),
         /// Changed parameters of the arm.
@@ -65,7 +67,7 @@ pub type RunAnswer<const N: usize> = Result<Box<Ran<N>>, Refused<RolloutError>>;
 pub struct Ran<const N: usize> {
     /// The run.
     pub run: Rollout<N>,
-    /// The worker's time for the run alone.
+    /// The worker's time for the steps, without samples and references.
     pub took: Duration,
 }
 
@@ -91,6 +93,7 @@ impl<const N: usize> Answered for RunOffline<N> {
             error_uncertainty: method.1,
             sampling_error: sampling.0,
             sampling_error_uncertainty: sampling.1,
+            divergence: run.divergence.map(|lost| object! { step: lost.step, time: lost.time }),
         };
         to.response(&values, "")
     }
@@ -117,12 +120,12 @@ const COLUMNS: usize = 5;
 /// A run in progress.
 pub struct RolloutWork<const N: usize> {
     most_bytes: usize,
-    /// The run alone; `None` once it is finished.
+    /// The steps alone; `None` once they are finished.
     alone: Option<Paused<Result<Rollout<N>, Refused<RolloutError>>>>,
     /// Its time so far.
     took: Duration,
-    /// The same run beside a reference, if one is requested.
-    compared: Option<Paused<Result<Rollout<N>, Refused<RolloutError>>>>,
+    /// The same run with its samples, and beside a reference if one is requested.
+    sampled: Paused<Result<Rollout<N>, Refused<RolloutError>>>,
 }
 
 impl<const N: usize> RolloutWork<N> {
@@ -130,11 +133,13 @@ impl<const N: usize> RolloutWork<N> {
     #[must_use]
     pub fn new(ask: &RunOffline<N>, present: Present<N>) -> Self {
         let samples = usize::try_from(ask.samples.unwrap_or(DEFAULT_SAMPLES));
-        let is_compared = ask.reference.unwrap_or(false);
-        let run = |reference: bool| {
+        let run = |is_alone: bool| {
             let ask = ask.clone();
             Paused::new(async move {
-                let request = request(&ask, &present, reference)?;
+                let mut request = request(&ask, &present)?;
+                if is_alone {
+                    (request.samples, request.reference) = (2, false);
+                }
                 rollout(request).await.map_err(Refused::Study)
             })
         };
@@ -143,9 +148,9 @@ impl<const N: usize> RolloutWork<N> {
                 .unwrap_or(usize::MAX)
                 .saturating_mul((3 * N + COLUMNS) * NUMBER_BYTES)
                 .saturating_add(most_bytes::<N>()),
-            alone: Some(run(false)),
+            alone: Some(run(true)),
             took: Duration::ZERO,
-            compared: is_compared.then(|| run(true)),
+            sampled: run(false),
         }
     }
 }
@@ -164,19 +169,17 @@ impl<const N: usize> Work<RunAnswer<N>> for RolloutWork<N> {
     }
 
     fn advance(&mut self, clock: fn() -> Duration) -> Option<RunAnswer<N>> {
-        let run = if let Some(alone) = &mut self.alone {
+        if let Some(alone) = &mut self.alone {
             let began = clock();
             let run = alone.advance();
             self.took += clock().saturating_sub(began);
-            let run = run?;
+            let is_refused = run?.is_err();
             self.alone = None;
-            if run.is_ok() && self.compared.is_some() {
+            if !is_refused {
                 return None;
             }
-            run
-        } else {
-            self.compared.as_mut()?.advance()?
-        };
+        }
+        let run = self.sampled.advance()?;
         let took = self.took;
         Some(run.map(|run| Box::new(Ran { run, took })))
     }
@@ -186,7 +189,6 @@ impl<const N: usize> Work<RunAnswer<N>> for RolloutWork<N> {
 fn request<const N: usize>(
     ask: &RunOffline<N>,
     present: &Present<N>,
-    reference: bool,
 ) -> Result<RolloutRequest<N>, ArmError> {
     let control = &present.control;
     let arm = arm_of(ask.params.as_ref(), control.arm)?;
@@ -200,15 +202,12 @@ fn request<const N: usize>(
             setpoint: setpoint.unwrap_or(control.setpoint),
             method: ask.method.unwrap_or(control.method),
             timestep: ask.timestep.unwrap_or(control.timestep),
-            period: with_period(control.period, ask.control_period),
+            period: with_period(control.period, ask.control_period, ask.delay),
             ..*control
         },
-        start: State {
-            position: ask.q0.unwrap_or([0.0; N]),
-            velocity: ask.qdot0.unwrap_or([0.0; N]),
-        },
+        start: state_of(ask.q, ask.qd, &present.state),
         duration: ask.duration.unwrap_or(DEFAULT_DURATION),
         samples: ask.samples.unwrap_or(DEFAULT_SAMPLES),
-        reference,
+        reference: ask.reference.unwrap_or(false),
     })
 }

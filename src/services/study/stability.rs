@@ -1,14 +1,14 @@
 //! `/study/stability`: the largest stable timesteps of a control loop.
 //!
 //! The present gains count, even if the controller is off. Gains of zero examine the free arm. The motion is the
-//! coming motion of the present arm.
+//! motion that begins at `q` and `qd`, by default the present arm's.
 //!
 //! **Invariant:** a limit is missing if no unstable timestep was found, and 0 if no stable one was found.
 
 use bytes::Bytes;
 
 use super::{Computed, Present, StudyWork};
-use super::{arm_of, with_period};
+use super::{arm_of, state_of, with_period};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
@@ -40,6 +40,12 @@ request! {
         setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
         /// The time between two runs of the control law \[s\], not negative; 0 for every step.
         control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
+        /// Whether an effort acts one period late.
+        delay: Option<bool> = super::delay(&mut fields),
+        /// Positions from which the motion begins \[rad\].
+        q: Option<[f64; N]> = fields.array("q", Bound::Finite),
+        /// Velocities there \[rad/s\].
+        qd: Option<[f64; N]> = fields.array("qd", Bound::Finite),
     }
 }
 
@@ -49,7 +55,7 @@ pub struct Predicted<const N: usize> {
     pub limits: Limits<N>,
     /// The limits of control period and timestep.
     pub clocks: ClockLimits,
-    /// The coming motion of the present arm, and its largest timestep.
+    /// The coming motion, and its largest timestep.
     pub motion: Motion,
     /// Whether the arm is free.
     pub is_free: bool,
@@ -105,8 +111,9 @@ impl<const N: usize> Computed<N> for PredictStability<N> {
     fn work(self, present: Present<N>) -> Self::Work {
         StudyWork::new::<N>(async move {
             let control = control_loop(&self, &present.control)?;
+            let start = state_of(self.q, self.qd, &present.state);
             Ok(Box::new(Predicted {
-                motion: Motion::ahead(&control, &present.state),
+                motion: Motion::ahead(&control, &start),
                 clocks: clock_limits(&control),
                 is_free: control.is_free(),
                 limits: search_limits(control).await,
@@ -128,7 +135,7 @@ fn control_loop<const N: usize>(
         gains: gains.map_or(present.gains, |gains| gains.applied_to(&present.gains)),
         setpoint: setpoint.unwrap_or(present.setpoint),
         method: ask.method.unwrap_or(present.method),
-        period: with_period(present.period, ask.control_period),
+        period: with_period(present.period, ask.control_period, ask.delay),
         ..*present
     })
 }

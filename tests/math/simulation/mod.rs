@@ -8,6 +8,17 @@ use pendularm::math::pid::{Gains, Pid, Setpoint};
 use pendularm::math::simulation::{ControlPeriod, Simulation};
 
 #[test]
+fn a_timestep_that_is_not_positive_is_refused_and_changes_nothing() {
+    let mut simulation = Simulation::<2>::new(Arm::default(), Gains::default());
+    assert!(simulation.set_timestep(0.002));
+    let before = simulation.clone();
+    for timestep in [-0.01, 0.0, -0.0, f64::NAN, f64::INFINITY] {
+        assert!(!simulation.set_timestep(timestep), "{timestep}");
+    }
+    assert_eq!(simulation, before);
+}
+
+#[test]
 fn a_period_is_the_nearest_number_of_steps_and_one_at_least() {
     for (period, timestep, steps) in [
         (0.0, 1e-3, 1),

@@ -1,14 +1,8 @@
 //! Frames in lines: their beginning and end, and the effect of a malformed one.
 
-use pendularm::protocol::wire::{Frame, frame::FrameReader};
+use pendularm::protocol::wire::frame::FrameReader;
 
 use super::{Outcome, outcomes, read};
-
-fn first_frame(stream: &str) -> Frame {
-    let mut reader = FrameReader::new();
-    reader.push(stream.as_bytes());
-    reader.next().expect("an outcome").expect("a frame")
-}
 
 /// An outcome in the spelling of the table: the frame's text, or the error's name.
 fn spelled(outcome: &Outcome) -> String {
@@ -94,10 +88,28 @@ fn a_line_that_is_no_object_is_reported_after_32_bytes() {
 }
 
 #[test]
-fn a_frame_says_whether_a_line_end_was_seen_behind_it() {
-    assert!(first_frame("{}\n").newline);
-    assert!(first_frame("{}\r\n{}").newline);
-    assert!(!first_frame("{}").newline);
-    assert!(!first_frame("{}{}\n").newline);
-    assert!(!first_frame("{} ").newline);
+fn a_reader_knows_whether_a_line_end_came_after_its_last_frame() {
+    for (packets, is_single) in [
+        (["{}\n", ""], false),
+        (["{}\r\n{", ""], false),
+        (["{}", ""], true),
+        (["{} ", " \t"], true),
+        (["{}", "{}"], true),
+        (["{}{}\n", ""], false),
+        // The line end may come in a packet of its own.
+        (["{}", "\n"], false),
+        (["{} ", "\r\n{"], false),
+    ] {
+        let mut reader = FrameReader::new();
+        assert!(!reader.is_single());
+        for packet in packets {
+            reader.push(packet.as_bytes());
+            reader.by_ref().for_each(drop);
+        }
+        assert_eq!(reader.is_single(), is_single, "{packets:?}");
+    }
+    let mut reader = FrameReader::new();
+    reader.push(b"{}{}\n");
+    reader.next();
+    assert!(reader.is_single(), "before the second frame");
 }

@@ -23,7 +23,7 @@ const REQUIRED: [(&str, &str); 12] = [
     ("call_service", r#"{"service":"/s"}"#),
     (
         "service_response",
-        r#"{"service":"/s","id":1,"values":{},"result":true}"#,
+        r#"{"service":"/s","id":1,"result":true}"#,
     ),
     ("send_action_goal", r#"{"action":"/a"}"#),
     ("cancel_action_goal", r#"{"action":"/a"}"#),

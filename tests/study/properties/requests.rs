@@ -92,16 +92,23 @@ fn arguments<const N: usize>(dice: &mut Dice, service: Service, usual: &Value) -
     format!("{{{}}}", members.join(","))
 }
 
+/// A moving arm.
+fn present<const N: usize>() -> Present<N> {
+    let setpoint = Setpoint::at([0.3; N]);
+    Present {
+        control: ControlLoop::new(Arm::default(), Gains::<N>::default(), setpoint),
+        state: State {
+            position: [0.2; N],
+            velocity: [0.1; N],
+        },
+    }
+}
+
 /// The number of pieces of a computation; `None` if the request is refused.
 fn pieces<const N: usize, T: Callable + Computed<N>>(service: Service, text: &str) -> Option<u64> {
     let raw = RawValue::from_string(text.to_owned()).unwrap();
     let ask = T::read(service, &Arguments::from(raw)).ok()?;
-    let setpoint = Setpoint::at([0.3; N]);
-    let present = Present {
-        control: ControlLoop::new(Arm::default(), Gains::<N>::default(), setpoint),
-        state: State::rest(),
-    };
-    let mut work = ask.work(present);
+    let mut work = ask.work(present());
     let mut pieces = 1;
     let most = match service {
         Service::SuggestGains => MOST_PIECES_OF_GAINS,
@@ -142,6 +149,82 @@ fn any_request_ends<const N: usize>(case: u64, tally: &mut Tally) {
 fn every_request_of_the_study_ends() {
     let tally = property!(any_request_ends, 40, 100_000);
     assert!(tally.tried > tally.open / 8, "{tally:?}");
+}
+
+fn answer<T: Callable + Computed<2>>(service: Service, text: &str) -> T::Answer {
+    let raw = RawValue::from_string(text.to_owned()).unwrap();
+    let ask = T::read(service, &Arguments::from(raw)).unwrap();
+    let mut work = ask.work(present());
+    loop {
+        if let Some(answer) = work.advance(|| std::time::Duration::ZERO) {
+            return answer;
+        }
+    }
+}
+
+/// A late effort halves the limit, and a fast start shortens the timestep of the motion.
+#[test]
+fn a_prediction_is_about_the_delay_and_the_state_of_its_request() {
+    let predicted = |text: &str| {
+        let found = answer::<PredictStability<2>>(Service::Stability, text).unwrap();
+        (found.limits.held.unwrap(), found.motion.speed)
+    };
+    let (at_once, still) = predicted("{}");
+    for text in [r#"{"delay":true}"#, r#"{"delay":1}"#] {
+        assert!(predicted(text).0 < 0.6 * at_once, "{text}");
+    }
+    assert_eq!(predicted(r#"{"delay":0}"#).0, at_once);
+    assert!(predicted(r#"{"q":[0.3,40],"qd":[0,0]}"#).1 > 2.0 * still);
+    let refused = RawValue::from_string(r#"{"delay":2}"#.to_owned()).unwrap();
+    let refused = PredictStability::<2>::read(Service::Stability, &Arguments::from(refused));
+    assert!(refused.unwrap_err().to_string().contains("delay"));
+}
+
+/// The present state by default, at rest where only a position is given, under both names.
+#[test]
+fn a_run_starts_in_the_state_of_its_request() {
+    let started = |text: &str| {
+        let ran = answer::<RunOffline<2>>(Service::Rollout, text).unwrap();
+        (ran.run.positions[0], ran.run.velocities[0])
+    };
+    let own = present::<2>().state;
+    for (text, expected) in [
+        ("{}", (own.position, own.velocity)),
+        (r#"{"q":[1,2]}"#, ([1.0, 2.0], [0.0; 2])),
+        (r#"{"qd":[3,4]}"#, (own.position, [3.0, 4.0])),
+        (r#"{"q0":[1,2],"qdot0":[3,4]}"#, ([1.0, 2.0], [3.0, 4.0])),
+        (r#"{"q":[1,2],"q0":[5,6]}"#, ([1.0, 2.0], [0.0; 2])),
+    ] {
+        let mut ask: Value = serde_json::from_str(text).unwrap();
+        ask["duration"] = json!(0.01);
+        assert_eq!(started(&ask.to_string()), expected, "{text}");
+    }
+}
+
+/// A clock that counts its readings: only the pieces of the steps alone are timed, however many samples there are.
+#[test]
+fn the_time_of_a_run_is_that_of_its_steps() {
+    use std::cell::Cell;
+    use std::time::Duration;
+    thread_local!(static READ: Cell<u64> = const { Cell::new(0) });
+    fn clock() -> Duration {
+        Duration::from_secs(READ.replace(READ.get() + 1))
+    }
+    let took = |samples: u64| {
+        let text =
+            format!(r#"{{"duration":10,"timestep":0.001,"samples":{samples},"reference":true}}"#);
+        let raw = RawValue::from_string(text).unwrap();
+        let ask = RunOffline::<2>::read(Service::Rollout, &Arguments::from(raw)).unwrap();
+        let mut work = ask.work(present());
+        loop {
+            if let Some(answer) = work.advance(clock) {
+                let ran = answer.unwrap();
+                assert_eq!(ran.run.times.len() as u64, samples);
+                return ran.took;
+            }
+        }
+    };
+    assert_eq!(took(1001), took(2));
 }
 
 /// Found by hand: a period of no length, and one beyond every duration.

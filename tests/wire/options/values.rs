@@ -31,6 +31,7 @@ fn values_within_their_bounds_are_accepted() {
         (":0", "127.0.0.1:0"),
         ("127.0.0.2", "127.0.0.2:9095"),
         ("[::1]", "[::1]:9095"),
+        ("::1", "[::1]:9095"),
     ] {
         assert_eq!(options(&["--bind", text]).bind.to_string(), address);
     }

@@ -13,7 +13,7 @@ const MOST_EVALUATIONS: u64 = 4_000_000;
 
 /// A run that is repeated until `LEAST_MEASURED` has passed. Its time is the mean of all runs.
 pub(super) struct Repeated<const N: usize> {
-    /// The same run without a reference, whose time is not measured.
+    /// The same run without samples and reference, whose time is not measured.
     alone: RunOffline<N>,
     present: Present<N>,
     work: RolloutWork<N>,
@@ -27,6 +27,7 @@ impl<const N: usize> Repeated<N> {
         Self {
             work: RolloutWork::new(&ask, present),
             alone: RunOffline {
+                samples: Some(2),
                 reference: None,
                 ..ask
             },

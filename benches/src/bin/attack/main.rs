@@ -23,7 +23,7 @@ use table::{Bars, Row, Verdict};
 /// Time from the healthy client's first call to the attack.
 const CALM: Duration = Duration::from_millis(100);
 /// Bytes of the report's file that slow readers ask for.
-const LARGE: usize = 8 * 1024 * 1024;
+const LARGE: usize = 3_900_000;
 
 /// Duration, strictness and selection of the attacks.
 struct Plan {

@@ -21,7 +21,7 @@ pub use self::orders::ArmOrder;
 pub use self::turn::{TURN, TURN_MESSAGES};
 pub use crate::live::{
     ArmEvent, ArmListener, GoalOrder, GoalProgress, LEAST_PAUSE, Obstacle, PUBLISH_RATE, Pose,
-    STEP_PAUSE, StepEvent, Tracking, WAKE_UP_BUDGET,
+    REST_TICKS, STEP_PAUSE, StepEvent, Tracking, WAKE_UP_BUDGET,
 };
 pub use crate::services::arm::{
     Disturb, Enable, Integrator, MAX_STEPS, Pause, PeriodInForce, Push, Reset, STEPS_IN_A_ROW,

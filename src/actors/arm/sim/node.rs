@@ -1,6 +1,6 @@
 //! The actor: reads the clock, advances the simulation, wakes for the next tick.
 //!
-//! The arm wakes 60 times a second. It advances to the present time before it handles a message, so every answer has
+//! The arm wakes 60 times a second, or 10 times while nothing observes it. It advances to the present time before it handles a message, so every answer has
 //! the present state. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond that
 //! are taken after [`STEP_PAUSE`]. Waiting messages do not delay the wake-up, because it is checked at the end of every
 //! [turn](super::turn).
@@ -30,6 +30,9 @@ use crate::services::arm::Stepped;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
+/// Nanoseconds between two ticks.
+const TICK: u64 = 1_000_000_000 / PUBLISH_RATE as u64;
+
 /// The node `arm_sim` for an arm of `N` links.
 pub struct ArmSim<const N: usize> {
     pub(super) arm: LiveArm<N, ArmWorld<N>>,
@@ -45,8 +48,19 @@ pub struct ArmSim<const N: usize> {
     pub(super) study: Option<Recipient<HeldLimit<N>>>,
     /// The actors that inform clients of goals, which get barriers.
     pub(super) goal_reporters: Vec<Recipient<Barrier>>,
+    /// The next wake-up.
+    tick: Option<Tick>,
     /// Feedback of the goal that has been sent and not yet arrived.
     pub(super) feedback_sent: Option<Pin<Box<RecipientRequest<GoalProgress<N>>>>>,
+}
+
+/// A scheduled wake-up.
+struct Tick {
+    timer: SpawnHandle,
+    /// The number of the tick before it, since the start.
+    after: u64,
+    /// The number of ticks until it: more than 1 while nothing observes the arm.
+    count: u64,
 }
 
 /// Requested steps that are not all taken, with the reply.
@@ -78,6 +92,7 @@ impl<const N: usize> ArmSim<N> {
             commander: None,
             study: None,
             goal_reporters: Vec::new(),
+            tick: None,
             feedback_sent: None,
         }
     }
@@ -110,6 +125,7 @@ impl<const N: usize> Handler<Interest> for ArmSim<N> {
     fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
         self.count_message(ctx);
         self.arm.set_wanted(interest.topic, interest.wanted);
+        self.end_rest(ctx);
         self.ask_limit(ctx);
     }
 }
@@ -135,17 +151,47 @@ impl<const N: usize> Handler<AttachNodes<N>> for ArmSim<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ArmSim<N> {
-    /// Wakes at the next multiple of the tick's length. Missed ticks are skipped, not made up.
-    fn schedule_tick(&self, ctx: &mut Context<Self>) {
-        let tick = Duration::from_secs(1) / PUBLISH_RATE;
-        let since_tick = self.arm.world.epoch.elapsed().as_nanos() % tick.as_nanos();
-        let wait = tick - Duration::from_nanos(u64::try_from(since_tick).unwrap_or(0));
-        ctx.run_later(wait, |arm, ctx| {
+    /// Wakes at the next multiple of the tick's length, or at a later one while nothing observes the arm. Missed ticks
+    /// are skipped, not made up.
+    fn schedule_tick(&mut self, ctx: &mut Context<Self>) {
+        let count = match self.commander {
+            Some(_) => 1,
+            None => self.arm.ticks_to_wake(),
+        };
+        let after = self.ticks_passed();
+        let due = Duration::from_nanos(TICK.saturating_mul(after + count));
+        let wait = due.saturating_sub(self.arm.world.epoch.elapsed());
+        let timer = ctx.run_later(wait, move |arm, ctx| {
             arm.advance_to_now(ctx);
             arm.ask_limit(ctx);
+            arm.arm.skip_ticks(count - 1);
             arm.arm.tick();
             arm.schedule_tick(ctx);
         });
+        self.tick = Some(Tick {
+            timer,
+            after,
+            count,
+        });
+    }
+
+    /// The multiples of the tick's length since the start.
+    fn ticks_passed(&self) -> u64 {
+        let passed = self.arm.world.epoch.elapsed().as_nanos() / u128::from(TICK);
+        u64::try_from(passed).unwrap_or(u64::MAX)
+    }
+
+    /// Wakes at the next tick, if the arm has rested and something observes it now. Call this after every message that
+    /// may begin that.
+    pub(super) fn end_rest(&mut self, ctx: &mut Context<Self>) {
+        let is_observed = self.commander.is_some() || self.arm.is_observed();
+        let Some(tick) = self.tick.take_if(|tick| tick.count > 1 && is_observed) else {
+            return;
+        };
+        ctx.cancel_future(tick.timer);
+        let passed = self.ticks_passed().saturating_sub(tick.after);
+        self.arm.skip_ticks(passed.min(tick.count - 1));
+        self.schedule_tick(ctx);
     }
 
     /// Call this at every message. It ends the turn after a limited amount of work.

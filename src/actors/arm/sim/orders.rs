@@ -33,7 +33,9 @@ where
 
     fn handle(&mut self, order: M, ctx: &mut Context<Self>) -> MessageResult<M> {
         self.take_due_steps(ctx);
-        MessageResult(order.perform(self))
+        let answer = order.perform(self);
+        self.end_rest(ctx);
+        MessageResult(answer)
     }
 }
 

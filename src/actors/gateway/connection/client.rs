@@ -18,11 +18,10 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::session::HeldPlace;
 use super::transport::{ClientLost, ClientStream, Transport};
 use crate::actors::compute::computations::Computations;
 use crate::actors::gateway::limits::{MAX_RESPONSES_WAITING, WRITE_BYTES, WRITE_FRAMES};
-use crate::actors::gateway::registry::{Registry, Request, ToClient};
+use crate::actors::gateway::registry::{HeldPlace, Registry, Request, ToClient};
 use crate::actors::panics::contain;
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::gone::Gone;

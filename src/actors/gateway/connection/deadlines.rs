@@ -21,10 +21,9 @@ use crate::actors::gateway::limits::{
     STALL_LIMIT,
 };
 use crate::actors::gateway::registry::{Request, Retire};
-use crate::actors::resources::gone::Gone;
 use crate::actors::resources::memory::time_to_read;
 use crate::actors::resources::turns::end_turn;
-use crate::actors::resources::unread::{Ends, closed};
+use crate::actors::resources::unread::closed;
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{CallService, Op, OpError, Problem};
@@ -175,16 +174,6 @@ impl ClientReader {
         client.computations.push(request, length);
         client.start_computation();
         ReadStep::Cutting
-    }
-}
-
-/// Waits until an op has taken effect that may wait for memory, since nothing is read meanwhile. If the client has closed
-/// its socket, the op is told, and its effect is not waited for.
-pub(super) async fn unless_closed(effect: impl Future<Output = ()>, gone: Gone, ends: Ends) {
-    tokio::select! {
-        biased;
-        () = effect => {}
-        () = closed(ends) => gone.set(),
     }
 }
 

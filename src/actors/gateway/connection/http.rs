@@ -10,9 +10,9 @@ use std::task::{Poll, ready};
 use bytes::BytesMut;
 use tokio::time::Instant;
 
-use super::session::{ClientSession, HeldPlace, Opened};
+use super::session::{ClientSession, Opened};
 use super::transport::{ClientStream, Transport};
-use crate::actors::gateway::registry::Request;
+use crate::actors::gateway::registry::{HeldPlace, Request};
 use crate::actors::resources::places::{HeldSlot, Refused};
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Incoming, Op, Verbosity};

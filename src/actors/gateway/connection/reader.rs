@@ -16,7 +16,6 @@ use bytes::BytesMut;
 use tokio::time::Instant;
 
 use super::client::Connection;
-use super::deadlines::unless_closed;
 use super::transport::{ClientLost, ClientStream};
 use crate::actors::ConnectionId;
 use crate::actors::compute::long_frames::{LongFrame, LongFrames, Parsed};
@@ -25,6 +24,7 @@ use crate::actors::gateway::registry::{Handled, Request, Retire};
 use crate::actors::resources::long_work::SHORT_WORK;
 use crate::actors::resources::memory::{Permit, time_to_read};
 use crate::actors::resources::turns::{Timer, end_turn};
+use crate::actors::resources::unread::unless_closed;
 use crate::protocol::catalog::Service;
 use crate::protocol::limits::{MAX_FRAME, SHORT};
 use crate::protocol::op::{self, CallService, Compression, Incoming, Op, Problem, Subscribe};
@@ -218,10 +218,11 @@ impl ClientReader {
         ready!(self.poll_may_read(client, cx))?;
         let transport = client.transport()?;
         let part = transport.cut()?;
-        let is_long_coming = transport.is_long_coming();
+        let (is_long_coming, is_single) = (transport.is_long_coming(), transport.is_single());
         if part.is_some() || !transport.is_unfinished() {
             self.frame_due = None;
         }
+        client.is_single = is_single;
         Poll::Ready(Ok(match part {
             Some(part) => self.take_part(client, part),
             None if client.is_finishing && !client.is_socket() => {
@@ -245,12 +246,12 @@ impl ClientReader {
         self.frames += 1;
         match part {
             FramePart::Lines(lines) => {
-                (self.speaks_json, client.is_single) = (true, false);
+                self.speaks_json = true;
                 let op = Ok(Op::PublishLines(lines));
                 self.perform(client, Incoming { id: None, op }, 0)
             }
             FramePart::Frame(frame) => {
-                (self.speaks_json, client.is_single) = (true, !frame.newline());
+                self.speaks_json = true;
                 let length = frame.len();
                 let frame = if length > SHORT_WORK {
                     LongFrame::Unread(frame)

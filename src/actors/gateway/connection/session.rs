@@ -13,9 +13,8 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 
 use super::admission::{Admission, WRONG_TOKEN_TIME, first_frame};
 use super::transport::{ClientStream, Transport};
-use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{FRAME_TIME, HEAD_TIME, LOOK_AGAIN, OPENING_TIME, READ_BYTES};
-use crate::actors::gateway::registry::{Connect, CountRefusal, Disconnect, Outlets, Registry};
+use crate::actors::gateway::registry::{Connect, CountRefusal, HeldPlace, Outlets, Registry};
 use crate::actors::resources::places::{HeldSlot, Refused};
 use crate::actors::resources::unread::Ends;
 use crate::protocol::messages::{self, Level};
@@ -40,18 +39,6 @@ pub(super) struct Opened<S> {
     pub(super) transport: Transport<S>,
     /// Bytes that were already read.
     pub(super) first: BytesMut,
-}
-
-/// The place of a registered client. Dropping it frees the place.
-pub(super) struct HeldPlace {
-    pub(super) id: ConnectionId,
-    registry: Addr<Registry>,
-}
-
-impl Drop for HeldPlace {
-    fn drop(&mut self) {
-        self.registry.do_send(Disconnect(self.id));
-    }
 }
 
 /// The result of the detection by a client's first bytes.
@@ -185,9 +172,7 @@ impl ClientSession {
             may_use_kept,
         };
         let answer = self.registry.send(connect).await;
-        let id = answer.unwrap_or(Err(Refused::Closed))?;
-        let registry = self.registry.clone();
-        Ok(HeldPlace { id, registry })
+        answer.unwrap_or(Err(Refused::Closed))
     }
 
     /// Reads until the first bytes identify the client's protocol. A client that ends before that counts as JSON. A

@@ -119,6 +119,14 @@ impl<S: ClientStream> Transport<S> {
         buffered > MEDIUM && self.is_unfinished()
     }
 
+    /// Whether each frame needs a separate write.
+    pub(super) const fn is_single(&self) -> bool {
+        match &self.protocol {
+            Protocol::Plain(frames) => frames.is_single(),
+            Protocol::WebSocket(..) => false,
+        }
+    }
+
     // ---- sending ----------------------------------------------------------------------------------------------------
 
     /// Sends some of `frames`, in order. Returns the number of bytes. The next call begins with the rest of a frame. Over

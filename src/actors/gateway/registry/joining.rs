@@ -19,9 +19,22 @@ use crate::actors::resources::places::Refused;
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::Verbosity;
 
-/// A new client. From its connection. Returns its id.
+/// The place of a registered client. Dropping it frees the place, even if the answer to [`Connect`] is lost.
+pub struct HeldPlace {
+    /// The client's id.
+    pub id: ConnectionId,
+    registry: Addr<Registry>,
+}
+
+impl Drop for HeldPlace {
+    fn drop(&mut self) {
+        self.registry.do_send(Disconnect(self.id));
+    }
+}
+
+/// A new client. From its connection. Returns its place.
 #[derive(Message)]
-#[rtype(result = "Result<ConnectionId, Refused>")]
+#[rtype(result = "Result<HeldPlace, Refused>")]
 pub struct Connect {
     /// The handles to its connection.
     pub outlets: Outlets,
@@ -66,7 +79,7 @@ impl Client {
 }
 
 impl Handler<Connect> for Registry {
-    type Result = Result<ConnectionId, Refused>;
+    type Result = Result<HeldPlace, Refused>;
 
     fn handle(&mut self, connect: Connect, ctx: &mut Context<Self>) -> Self::Result {
         if self.closed.is_some() {
@@ -84,7 +97,8 @@ impl Handler<Connect> for Registry {
         let client = Client::new(connect.outlets, connect.from, link);
         self.clients.insert(id, client);
         self.gauges.set_connections(self.clients.len() as u64);
-        Ok(id)
+        let registry = ctx.address();
+        Ok(HeldPlace { id, registry })
     }
 }
 

@@ -24,7 +24,7 @@ use bytes::Bytes;
 use tokio::sync::oneshot;
 use tokio::time::Instant;
 
-pub use self::joining::{Connect, CountRefusal, Disconnect, Retire};
+pub use self::joining::{Connect, CountRefusal, Disconnect, HeldPlace, Retire};
 use crate::actors::ConnectionId;
 use crate::actors::graph::forwarded::ForwardedRequests;
 use crate::actors::graph::providers::Providers;

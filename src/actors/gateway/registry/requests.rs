@@ -8,6 +8,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::task::{self, Poll, ready};
+use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -36,6 +37,10 @@ use crate::services::{Address, NoService};
 
 /// Calls and goals ended per cleanup, which takes a third of a millisecond.
 const ENDED_IN_A_ROW: usize = 128;
+/// A deadline that is noticed so late shows that the process was stopped.
+const STOPPED: Duration = Duration::from_millis(250);
+/// Time to read the answers in sockets after a stop.
+const READ_SOCKETS: Duration = Duration::from_millis(50);
 
 // ---- to the runtime's own nodes -------------------------------------------------------------------------------------
 
@@ -639,7 +644,25 @@ impl Registry {
 // ---- cleanup: requests end in batches, and other messages are handled in between ------------------------------------
 
 /// Ends calls past their deadlines, and requests of disconnected providers. The actor polls it after each message.
-struct Cleanup(Timer);
+#[derive(Default)]
+struct Cleanup {
+    timer: Timer,
+    /// Calls end from this time on, after the process was stopped beyond a deadline.
+    sockets_read: Option<Instant>,
+}
+
+impl Cleanup {
+    /// When the next call ends. If its deadline passed long ago, the process was stopped, and an answer may wait in a
+    /// socket. So the sockets are read first.
+    fn next_end(&mut self, deadline: Option<Instant>, now: Instant) -> Option<Instant> {
+        let was_stopped = deadline.is_some_and(|deadline| deadline + STOPPED < now);
+        self.sockets_read = match was_stopped {
+            true => self.sockets_read.or(Some(now + READ_SOCKETS)),
+            false => None,
+        };
+        deadline.max(self.sockets_read)
+    }
+}
 
 impl ActorFuture<Registry> for Cleanup {
     type Output = ();
@@ -651,7 +674,8 @@ impl ActorFuture<Registry> for Cleanup {
         cx: &mut task::Context<'_>,
     ) -> Poll<()> {
         if registry.gone.is_empty() {
-            ready!(self.0.poll(registry.requests.next_deadline(), cx));
+            let end = self.next_end(registry.requests.next_deadline(), Instant::now());
+            ready!(self.timer.poll(end, cx));
         }
         registry.clean_up_batch();
         end_turn(cx)
@@ -660,7 +684,7 @@ impl ActorFuture<Registry> for Cleanup {
 
 impl Registry {
     pub(super) fn start_cleanup(ctx: &mut Context<Self>) {
-        ctx.spawn(Cleanup(Timer::default()));
+        ctx.spawn(Cleanup::default());
     }
 
     /// Ends one batch: first calls past their deadlines, then requests of disconnected providers.
