@@ -3,6 +3,8 @@
 //! A diagnosis asks the server for one more answer, and compares it with the right model and with each wrong one. It names a
 //! mistake only if that model is near, and every other model is [`RATIO`] times farther away.
 
+#![allow(clippy::type_complexity, reason = "a model is a function of functions")]
+
 pub mod equations;
 pub mod measured;
 pub mod steps;

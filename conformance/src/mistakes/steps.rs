@@ -146,7 +146,6 @@ pub const COMMON: [(&str, Variant); 8] = [
 pub type Variant = fn(&str, &State, f64, f64, Force) -> State;
 
 /// The steps that a wrong implementation of a method may take, with their descriptions.
-#[allow(clippy::type_complexity, reason = "a description and a step")]
 pub fn steps<'a>(method: &'static str) -> Vec<(String, Box<dyn Fn(&State, f64, f64, Force) -> State + 'a>)> {
     let mut all: Vec<(String, Box<dyn Fn(&State, f64, f64, Force) -> State>)> = Vec::new();
     for (_, says, step) in STEPPERS.iter().filter(|(of, ..)| *of == method) {
