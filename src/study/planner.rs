@@ -92,7 +92,7 @@ pub enum PlanError {
     /// A control period that is too long \[s\].
     #[error("control_period must be at most {MAX_DURATION} s, got {}", shown_against(*.0, MAX_DURATION))]
     PeriodTooLong(f64),
-    /// More control periods than [`MAX_STEPS`].
+    /// More control periods than can be simulated.
     #[error(
         "duration / control_period must be at most {MAX_STEPS} periods, got {}",
         shown_against(*.0, in_f64(MAX_STEPS))

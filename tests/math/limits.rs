@@ -65,12 +65,11 @@ fn plain(anti_windup: AntiWindup, every: usize, duration: f64) -> Vec<f64> {
                 let given = wanted.max(-LIMIT[i]).min(LIMIT[i]);
                 let is_limited = wanted != given;
                 integral[i] = match anti_windup {
-                    AntiWindup::Clamp => next.max(-50.0).min(50.0),
-                    AntiWindup::None => next,
+                    AntiWindup::Clamp => next.clamp(-50.0, 50.0),
                     AntiWindup::Conditional if is_limited && (e > 0.0) == (wanted > 0.0) => {
                         integral[i]
                     }
-                    AntiWindup::Conditional => next,
+                    AntiWindup::None | AntiWindup::Conditional => next,
                     AntiWindup::BackCalculation => {
                         next + dt / TRACKING_TIME * (given - wanted) / gains.ki[i]
                     }

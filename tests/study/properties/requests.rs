@@ -65,8 +65,7 @@ fn arguments<const N: usize>(dice: &mut Dice, service: Service, usual: &Value) -
                 "\"{}\"",
                 ["euler", "midpoint", "verlet", "rk4"][dice.0.usize(0..4)]
             ),
-            ("controller" | "reference", _) => dice.0.bool().to_string(),
-            ("delay", true) => dice.0.bool().to_string(),
+            ("controller" | "reference", _) | ("delay", true) => dice.0.bool().to_string(),
             ("samples", true) => "2".to_owned(),
             ("params", true) => format!(
                 r#"{{"gravity":{},"masses":{},"lengths":{}}}"#,

@@ -22,6 +22,10 @@ type Step = [[DoubleDouble; STATES]; STATES];
 const SQUARINGS: u32 = 62;
 
 /// The matrix of one step of `h` \[s\], column by column.
+#[allow(
+    clippy::needless_range_loop,
+    reason = "a column is written into every row"
+)]
 fn step<const N: usize>(linear: &Linear, method: Method, h: f64) -> Step {
     let exact = DoubleDouble::from;
     let mut matrix = [[DoubleDouble::ZERO; STATES]; STATES];
@@ -132,7 +136,9 @@ fn nothing_is_limited_where_nothing_grows<const N: usize>(case: u64, tally: &mut
         tally.tried += 1;
         let is_justified = linears.iter().any(|linear| {
             let modes = linear.flow().eigenvalues().into_iter();
-            let rate = modes.map(|mode| mode.modulus()).fold(0.0, f64::max);
+            let rate = modes
+                .map(pendularm::study::matrix::Complex::modulus)
+                .fold(0.0, f64::max);
             let timesteps = if limit > 0.0 {
                 [1.0001, 1.003, 1.03, 1.1].map(|part| part * limit)
             } else {
