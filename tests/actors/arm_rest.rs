@@ -151,3 +151,18 @@ fn the_first_message_after_a_rest_comes_when_it_is_due() {
         }
     });
 }
+
+/// A message that ends the rest may come when the wake-up is already due.
+#[test]
+fn a_subscription_at_the_time_of_a_wake_up_does_not_double_the_messages() {
+    for microseconds in [99_999, 100_000, 100_001, 100_999, 101_000, 101_500, 102_000] {
+        in_virtual_time(async move {
+            let (arm, published) = arm();
+            sleep(Duration::from_micros(microseconds)).await;
+            want(&arm, Topic::JointStates, true).await;
+            sleep(ms(1000)).await;
+            let count = published.borrow().len();
+            assert!((59..=62).contains(&count), "{count} after {microseconds} us");
+        });
+    }
+}

@@ -214,8 +214,8 @@ table! {
         /// Runs the arm offline.
         Rollout = service("/study/rollout", "pendularm_interfaces/srv/Rollout", Node::Study)
             .request(fields![
-                "float64[] q?  # rad",
-                "float64[] qd?  # rad/s",
+                "float64[] q0?  # rad",
+                "float64[] qdot0?  # rad/s",
                 "float64 duration?  # s",
                 "float64 timestep?  # s",
                 "string integrator?",
@@ -226,6 +226,8 @@ table! {
                 "bool reference?",
                 "float64 control_period?  # s",
                 "bool delay?",
+                "float64[] q?  # rad",
+                "float64[] qd?  # rad/s",
             ])
             .response(fields![
                 "float64[] times  # s",
@@ -270,13 +272,15 @@ table! {
                 "float64 error  # m",
                 "float64 duration?  # s",
                 "bool controller?",
-                "float64[] q?  # rad",
-                "float64[] qd?  # rad/s",
+                "float64[] q0?  # rad",
+                "float64[] qdot0?  # rad/s",
                 "pendularm_interfaces/msg/Params params?  # SI",
                 "pendularm_interfaces/msg/Gains gains?  # SI",
                 "float64[] setpoint?  # rad",
                 "float64 control_period?  # s",
                 "bool delay?",
+                "float64[] q?  # rad",
+                "float64[] qd?  # rad/s",
             ])
             .response(fields![
                 "string integrator",

@@ -50,6 +50,8 @@ pub struct ArmSim<const N: usize> {
     pub(super) goal_reporters: Vec<Recipient<Barrier>>,
     /// The next wake-up.
     tick: Option<Tick>,
+    /// Wake-ups that have been scheduled.
+    scheduled: u64,
     /// Feedback of the goal that has been sent and not yet arrived.
     pub(super) feedback_sent: Option<Pin<Box<RecipientRequest<GoalProgress<N>>>>>,
 }
@@ -57,6 +59,8 @@ pub struct ArmSim<const N: usize> {
 /// A scheduled wake-up.
 struct Tick {
     timer: SpawnHandle,
+    /// Its number among the scheduled wake-ups. A cancelled timer that is already due may still fire.
+    number: u64,
     /// The number of the tick before it, since the start.
     after: u64,
     /// The number of ticks until it: more than 1 while nothing observes the arm.
@@ -93,6 +97,7 @@ impl<const N: usize> ArmSim<N> {
             study: None,
             goal_reporters: Vec::new(),
             tick: None,
+            scheduled: 0,
             feedback_sent: None,
         }
     }
@@ -161,7 +166,13 @@ impl<const N: usize> ArmSim<N> {
         let after = self.ticks_passed();
         let due = Duration::from_nanos(TICK.saturating_mul(after + count));
         let wait = due.saturating_sub(self.arm.world.epoch.elapsed());
+        self.scheduled += 1;
+        let number = self.scheduled;
         let timer = ctx.run_later(wait, move |arm, ctx| {
+            let is_it = |tick: &mut Tick| tick.number == number;
+            if arm.tick.take_if(is_it).is_none() {
+                return;
+            }
             arm.advance_to_now(ctx);
             arm.ask_limit(ctx);
             arm.arm.skip_ticks(count - 1);
@@ -170,6 +181,7 @@ impl<const N: usize> ArmSim<N> {
         });
         self.tick = Some(Tick {
             timer,
+            number,
             after,
             count,
         });
