@@ -21,6 +21,7 @@ __all__ = [
     "end_effector",
     "forward_dynamics",
     "gravity_load",
+    "held_limit",
     "inverse_dynamics",
     "inverse_kinematics",
     "is_masked",

@@ -6,7 +6,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from . import _native
-from ._fields import Floats, as_doubles, is_masked, shown, whole_number
+from ._fields import Floats, shown, whole_number
+from ._native import as_doubles, is_masked
 
 __all__ = ["HeldLimit", "HeldMode", "held_limit"]
 

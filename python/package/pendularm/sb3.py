@@ -54,8 +54,7 @@ class Sb3VecEnv(VecEnv):
 
     def get_images(self) -> tuple[Frame, ...]:
         """A frame per arm, with `render_mode="rgb_array"`."""
-        frames: tuple[Frame, ...] | None = self.arms.render()
-        return frames or ()
+        return tuple(np.asarray(frame) for frame in self.arms.render() or ())
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
         """An attribute, once for each arm. The spaces are those of one arm."""

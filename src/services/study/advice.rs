@@ -7,7 +7,7 @@ use bytes::Bytes;
 use super::{Computed, Present, Refused, StudyWork, arm_of, state_of, with_period};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
-use crate::math::pid::Setpoint;
+use crate::math::pid::{Gains, Setpoint};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
@@ -216,16 +216,16 @@ impl<const N: usize> Computed<N> for PlanRun<N> {
 fn task<const N: usize>(ask: &PlanRun<N>, present: &Present<N>) -> Result<Task<N>, ArmError> {
     let Present { control, state } = present;
     let arm = arm_of(ask.params.as_ref(), control.arm)?;
-    // With `controller` the present gains apply. Otherwise the arm is free, as in a rollout.
-    let missing = if ask.controller {
-        control.gains
-    } else {
-        no_control()
+    // With `controller` the present gains apply. Otherwise the arm is free, and a missing member is that of a new arm, as
+    // in a rollout.
+    let (missing, present_or_new) = match ask.controller {
+        true => (control.gains, control.gains),
+        false => (no_control(), Gains::default()),
     };
     let gains = ask.gains.as_ref();
     let control = ControlLoop {
         arm,
-        gains: gains.map_or(missing, |gains| gains.applied_to(&missing)),
+        gains: gains.map_or(missing, |gains| gains.applied_to(&present_or_new)),
         setpoint: ask.setpoint.map_or(control.setpoint, Setpoint::at),
         period: with_period(
             control.period,

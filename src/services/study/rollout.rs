@@ -13,7 +13,7 @@ use serde::{Serialize, Serializer};
 use super::{Computed, NUMBER_BYTES, Present, Refused, Work, arm_of, state_of, with_period};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
-use crate::math::pid::Setpoint;
+use crate::math::pid::{Gains, Setpoint};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
@@ -49,7 +49,7 @@ request! {
         method: Option<Method> = fields.choice("integrator", &Method::ALL, Method::name),
         /// Changed parameters of the arm.
         params: Option<SetParams<N>> = fields.object("params", SetParams::from_fields),
-        /// The gains. Without them the arm is free. A missing member counts as 0.
+        /// The gains. Without them the arm is free. A missing member is that of a new arm.
         gains: Option<SetGains<N>> = fields.object("gains", SetGains::from_fields),
         /// The setpoint \[rad\], at rest.
         setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
@@ -197,8 +197,8 @@ fn request<const N: usize>(
     Ok(RolloutRequest {
         control: ControlLoop {
             arm,
-            // A missing member of the gains counts as 0. Without gains there is no control.
-            gains: gains.map_or(no_control(), |gains| gains.applied_to(&no_control())),
+            // Without gains there is no control.
+            gains: gains.map_or(no_control(), |gains| gains.applied_to(&Gains::default())),
             setpoint: setpoint.unwrap_or(control.setpoint),
             method: ask.method.unwrap_or(control.method),
             timestep: ask.timestep.unwrap_or(control.timestep),
