@@ -112,6 +112,12 @@ impl Modes {
         growth.fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// The number of modes that are [`DOUBTFUL`].
+    fn slow(&self) -> usize {
+        let slow = |mode: &&Complex| mode.modulus() < DOUBTFUL * self.rate;
+        self.eigenvalues.iter().filter(slow).count()
+    }
+
     /// Whether a mode clearly grows, also if rounding has spread a double eigenvalue near zero.
     pub(super) fn clearly_grow(&self) -> bool {
         let least = DOUBTFUL * self.rate;
@@ -233,7 +239,8 @@ impl<'a> Stepping<'a> {
 
     /// Fastest growth of any mode in a period \[s\], as of [`growth`].
     pub(super) fn growth(&self, period: f64) -> f64 {
-        growth(&self.generator(period), period)
+        let slow_modes = || Modes::of(self.linear).slow();
+        growth(&self.generator(period), period, slow_modes)
     }
 
     /// Whether no mode grows at this period. NaN counts as unstable.
@@ -248,18 +255,26 @@ impl<'a> Stepping<'a> {
 }
 
 /// Fastest growth of any mode of `x ↦ (I + T E) x`, `max (2 Re μ + T |μ|²)`, relative to the largest `|μ|`; NaN if not
-/// finite.
-pub(super) fn growth(generator: &Matrix, period: f64) -> f64 {
-    let values = generator.eigenvalues();
+/// finite. `slow_modes` counts the modes of the loop in continuous time that are [`DOUBTFUL`]: that many here say nothing.
+pub(super) fn growth(generator: &Matrix, period: f64, slow_modes: impl FnOnce() -> usize) -> f64 {
+    let mut values = generator.eigenvalues();
     let fastest = largest(values.iter().map(|mu| mu.modulus()));
     if fastest == 0.0 {
         return 0.0;
     }
-    let growth = |mu: Complex| 2.0 * mu.re + period * mu.modulus() * mu.modulus();
-    let growths = values.into_iter().map(|mu| {
-        let is_doubtful = mu.modulus() < DOUBTFUL * fastest;
-        let growth = growth(mu) / fastest;
-        if is_doubtful { growth.min(0.0) } else { growth }
+    let growth = |mu: &Complex| (2.0 * mu.re + period * mu.modulus() * mu.modulus()) / fastest;
+    let is_doubtful = |mu: &&Complex| mu.modulus() < DOUBTFUL * fastest;
+    values.sort_by(|one, other| one.modulus().total_cmp(&other.modulus()));
+    let doubtful = || values.iter().take_while(is_doubtful);
+    // Near its limit a fast mode has a small `|μ|` too.
+    let silent = match doubtful().any(|mu| growth(mu) > 0.0) {
+        true => slow_modes().min(doubtful().count()),
+        false => 0,
+    };
+    let growths = values.iter().map(growth).enumerate();
+    let growths = growths.map(|(place, growth)| match place < silent {
+        true => growth.min(0.0),
+        false => growth,
     });
     largest_above(f64::NEG_INFINITY, growths)
 }

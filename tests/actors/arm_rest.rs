@@ -162,7 +162,10 @@ fn a_subscription_at_the_time_of_a_wake_up_does_not_double_the_messages() {
             want(&arm, Topic::JointStates, true).await;
             sleep(ms(1000)).await;
             let count = published.borrow().len();
-            assert!((59..=62).contains(&count), "{count} after {microseconds} us");
+            assert!(
+                (59..=62).contains(&count),
+                "{count} after {microseconds} us"
+            );
         });
     }
 }

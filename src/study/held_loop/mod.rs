@@ -333,7 +333,7 @@ impl HeldLoop {
 
     /// Fastest growth of any mode, relative to the fastest change.
     fn growth(&self, period: f64) -> f64 {
-        growth(&self.generator(period), 1.0)
+        growth(&self.generator(period), 1.0, || 0)
     }
 
     /// Periods by which a held effort lags behind the law's sample, where the motion is slow against a period: half a
