@@ -682,7 +682,7 @@ async function measure() {
   const isWanted = () => mine === now && key === keyOf(presentMove());
   const refused = await climb(move, 1, isWanted, (rung) => { mine.runs.push(rung); surface.redraw(); });
   setText(byId("course-status"), inPageNames(refused));
-  mine.seen.measured = mine.runs.length === rungs().length;
+  mine.seen.measured = mine.runs.length === rungs(move.control_period).length;
   look();
 }
 

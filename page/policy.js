@@ -97,8 +97,8 @@ export function limitInForce(/** @type {State} */ state, method = state.integrat
     place,
     everyPose: Math.min(motion, everyPoseAtRest),
     everyPoseAtRest,
-    // Never the timestep at which the arm has just diverged.
-    advised: diverged ? Math.min(usual, AFTER_DIVERGENCE * timestep) : usual,
+    // Never the timestep at which this loop has just diverged.
+    advised: diverged && timestep > 0 ? Math.min(usual, AFTER_DIVERGENCE * timestep) : usual,
   };
 }
 
@@ -217,7 +217,8 @@ export function verdict(state) {
   const limit = Number.isNaN(own.limit) ? NaN : slow ? periodLimit : steps > 1 ? own.limit : Math.min(own.limit, periodLimit);
   const everyPose = slow ? Math.min(periodLimit, own.everyPoseAtRest) : own.everyPose;
   // A smaller timestep does not make the control period shorter. Nothing is offered that is in force already.
-  const present = Math.min(timestep, state.integrator?.timestep ?? NaN);
+  const now = state.integrator?.timestep ?? NaN;
+  const present = timestep > 0 ? Math.min(timestep, now) : now;
   const offered = !slow && own.advised > 0 && own.advised < present ? own.advised : NaN;
   const known = { limit, where, advised: offered, slow };
   const at = slow ? `A control period of ${duration(time)}` : duration(time);

@@ -190,7 +190,12 @@ function diagnostics(msg) {
   keep("diverged", report.state === "diverged");
   if (motionHasChanged(answerInForce(state), report)) askNow();
   if (before === report.state) return;
-  poll(); // another client may have caused this
+  // Another client may have caused this, with settings that are not known yet.
+  poll()?.then(() => {
+    if (!state.broken) return;
+    state.broken = questionOf(state);
+    set("diagnostics", state.diagnostics);
+  });
   if (report.state === "diverged") warn(`The simulation has ${report.message}`);
 }
 
@@ -214,8 +219,9 @@ function goalResult(msg) {
 
 // Settings: each call reads or changes them, and stores the present values.
 
+/** Asks for all settings. Returns the answer to the last question, after which all are known. */
 function poll() {
-  if (!bridge.open || document.hidden) return;
+  if (!bridge.open || document.hidden) return undefined;
   setParams({});
   setIntegrator({});
   setGains({});
@@ -223,8 +229,9 @@ function poll() {
   setFriction({});
   setMotors({});
   pause();
-  enable();
+  const last = enable();
   askStability();
+  return last;
 }
 
 async function settings(service, args, keep) {

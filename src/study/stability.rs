@@ -112,9 +112,11 @@ impl Modes {
         growth.fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// The number of modes that are [`DOUBTFUL`].
+    /// The number of modes that are [`DOUBTFUL`] and do not clearly decay.
     fn slow(&self) -> usize {
-        let slow = |mode: &&Complex| mode.modulus() < DOUBTFUL * self.rate;
+        let least = DOUBTFUL * self.rate;
+        let decays = |mode: &Complex| mode.re < -0.5 * mode.modulus();
+        let slow = |mode: &&Complex| mode.modulus() < least && !decays(mode);
         self.eigenvalues.iter().filter(slow).count()
     }
 
@@ -255,7 +257,8 @@ impl<'a> Stepping<'a> {
 }
 
 /// Fastest growth of any mode of `x ↦ (I + T E) x`, `max (2 Re μ + T |μ|²)`, relative to the largest `|μ|`; NaN if not
-/// finite. `slow_modes` counts the modes of the loop in continuous time that are [`DOUBTFUL`]: that many here say nothing.
+/// finite. `slow_modes` counts the modes of the loop in continuous time that are [`DOUBTFUL`]: that many of those that
+/// seem to grow here say nothing.
 pub(super) fn growth(generator: &Matrix, period: f64, slow_modes: impl FnOnce() -> usize) -> f64 {
     let mut values = generator.eigenvalues();
     let fastest = largest(values.iter().map(|mu| mu.modulus()));
@@ -265,16 +268,18 @@ pub(super) fn growth(generator: &Matrix, period: f64, slow_modes: impl FnOnce() 
     let growth = |mu: &Complex| (2.0 * mu.re + period * mu.modulus() * mu.modulus()) / fastest;
     let is_doubtful = |mu: &&Complex| mu.modulus() < DOUBTFUL * fastest;
     values.sort_by(|one, other| one.modulus().total_cmp(&other.modulus()));
-    let doubtful = || values.iter().take_while(is_doubtful);
+    let doubtful = values.iter().take_while(is_doubtful);
     // Near its limit a fast mode has a small `|μ|` too.
-    let silent = match doubtful().any(|mu| growth(mu) > 0.0) {
-        true => slow_modes().min(doubtful().count()),
-        false => 0,
+    let mut silent = match doubtful.filter(|mu| growth(mu) > 0.0).count() {
+        0 => 0,
+        growing => growing.min(slow_modes()),
     };
-    let growths = values.iter().map(growth).enumerate();
-    let growths = growths.map(|(place, growth)| match place < silent {
-        true => growth.min(0.0),
-        false => growth,
+    let growths = values.iter().map(growth).map(|growth| {
+        if growth > 0.0 && silent > 0 {
+            silent -= 1;
+            return 0.0;
+        }
+        growth
     });
     largest_above(f64::NEG_INFINITY, growths)
 }

@@ -155,9 +155,9 @@ class Phone(Free, Steady, Access, PageTest):
 
     def test_settings_that_fold_show_that_they_do(self):
         marks = lambda: self.page.run("[...document.querySelectorAll('#controls summary')].map((one) => getComputedStyle(one, '::before').content[1])")
-        self.assertEqual(marks(), ["▾", "▾", "▸"])
+        self.assertEqual(marks(), ["▾", "▾", "▸", "▸"])
         self.page.click("#controls details:last-child summary")
-        self.assertEqual(marks(), ["▾", "▾", "▾"])
+        self.assertEqual(marks(), ["▾", "▾", "▸", "▾"])
 
     def test_touch_targets_are_44_pixels_high(self):
         small = self.page.run("[...document.querySelectorAll('button, select, input:not([type=checkbox], [type=radio]), summary, .segment')]"
