@@ -102,12 +102,12 @@ pub fn run(options: &Options, force_exit: Box<dyn FnOnce() + Send>) -> Result<()
     System::with_tokio_rt(move || tokio).block_on(serve(options, &mut signals))
 }
 
-/// Starts all threads for long work of the gateway at once. None of them ends. If the system refuses one, work uses
-/// the threads that exist.
+/// Starts all threads for long work of the gateway and for the report's files at once. None of them ends. If the system
+/// refuses one, work uses the threads that exist.
 fn start_long_work_threads(tokio: &Runtime) -> std::io::Result<()> {
     let all_are_busy = Arc::new(Mutex::new(()));
     let _until_all_are_there = all_are_busy.lock();
-    for _ in 0..THREADS {
+    for _ in 0..THREADS + FILES {
         let wait = Arc::clone(&all_are_busy);
         contain(|| drop(tokio.spawn_blocking(move || drop(wait.lock()))))
             .map_err(|panic| std::io::Error::other(panic.to_string()))?;
