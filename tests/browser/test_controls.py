@@ -207,7 +207,7 @@ class Controls(PageTest):
         self.assertIn("At 7 ms, against Runge–Kutta 4 at 875 µs", self.page.text("#compare-text"))
 
     def test_a_comparison_without_a_reference_judges_no_run(self):
-        self.page.until("own('question.js').then(async ({ questionOf }) => questionOf((await own('store.js')).state) !== null)", why="all settings")
+        self.page.until("own('store.js').then(({ state }) => state.connection === 'open' && state.gains !== null && state.setpointKnown)")
         self.tab("compare")
         self.page.run("document.querySelectorAll('#compare-form select').forEach((one, i) => { one.value = ['rest', 'on'][i]; })")
         self.page.fill(f"#compare-form {NUMBER}", "1000")
