@@ -52,7 +52,7 @@ def test_a_rollout_is_the_services_and_the_simulations(runtime, links):
     run = pendularm.rollout(pendularm.Arm(links), **asked)
     ours = plain(run)
     assert run.wall_time > 0
-    assert ours.pop("divergence") is None
+    assert ours["divergence"] is None
     del ours["wall_time"], theirs["wall_time"]
     assert ours == theirs
 
