@@ -68,6 +68,8 @@ class PageTest(unittest.TestCase):
         if IS_FILE:
             self.runtime.page = page
         self.addCleanup(lambda: self.assertEqual(page.complaints, []))
+        # All pages from disk share one storage; those of servers have one for each port.
+        self.addCleanup(lambda: page.run("(() => { try { localStorage.clear(); } catch {} })()"))
         self.addCleanup(lambda: page.screenshot(ARTEFACTS / f"{self.id()}.png"))
         self.connected(page)
         return page

@@ -179,7 +179,7 @@ class Tasks(CourseTest):
         self.done("a cure")
         self.keep("pid")
         self.assertTrue(self.page.run("document.querySelector('#course-steps [data-step=pid]').classList.contains('done')"), "a tick at the number")
-        self.assertRegex(self.page.run("own('views.js').then((share) => share.address())"), r"done=([a-z]+,)*pid[,&]")
+        self.assertIn("done=pid&", self.page.run("own('views.js').then((share) => share.address())"))
         self.step("method")
         self.assertEqual(self.values("/pid_controller/set_limits")["effort"], None, "the next scene has no limit")
         page = self.open("#step=own&done=hold,nonsense")
@@ -334,7 +334,7 @@ class Tasks(CourseTest):
         self.wait(lambda: abs(self.values("/pid_controller/set_period")["period"] - 0.0055) < 1e-12, "the scene")
         self.assertEqual(self.page.run("location.hash"), "#step=limit")
         link = self.page.run("own('views.js').then((share) => share.address())")
-        self.assertRegex(link, r"#step=limit&(done=[a-z,]+&)?links=2")
+        self.assertIn("#step=limit&links=2", link)
         self.page.click("#view-switch")
         self.page.until("document.querySelector('#period-field input[type=number]').checkVisibility() && document.querySelector('#period-field "
             "input[type=number]').value === '5.5'")
