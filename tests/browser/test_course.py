@@ -242,6 +242,7 @@ class Tasks(CourseTest):
             self.assertIn("start pendularm with --links 3", self.page.text("#scene-S01:disabled").replace("\u2060", "").replace("\xa0", " "))
             return
         self.page.run("window.old = 1")
+        self.page.click("#course-extra summary")
         self.page.click("#scene-S01")
         self.page.until("window.old === undefined && document.querySelector('#links')?.value === '3'", why="another arm")
         self.page.until("document.querySelector('#course-number').textContent === 'Step 10 of 11' && !document.querySelector('#scene-S01').disabled")

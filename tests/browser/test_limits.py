@@ -58,7 +58,7 @@ class BlowUp(PageTest):
             self.page.run("document.querySelector('#map').focus()")
             for key, *wanted in steps:
                 self.page.key(key)
-                self.wait(lambda: present() == tuple(wanted), f"{key}: {wanted}", 10)
+                self.wait(lambda: present() == tuple(wanted), f"{key}: {wanted}")
                 self.page.until(f"own('store.js').then(({{ state }}) => state.integrator.timestep === {wanted[0]} && state.gains.kp[0] === {wanted[1]})")
 
     def test_one_button_recovers(self):
