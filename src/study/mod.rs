@@ -22,6 +22,7 @@ pub mod held_loop;
 mod limits;
 pub mod linear;
 pub mod matrix;
+pub mod method;
 pub mod motion;
 pub mod paused;
 pub mod planner;

@@ -25,6 +25,7 @@ mod folder;
 mod friction;
 mod held_loop;
 mod matrix;
+mod method;
 mod motion;
 mod planner;
 mod poses;

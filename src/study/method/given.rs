@@ -1,0 +1,93 @@
+//! A method as the reader has typed it, and the faults of its sums.
+//!
+//! **Invariant:** `c` and the embedded method have one finite coefficient for each stage.
+
+use super::super::tableau::{Pair, Tableau, TableauError};
+
+/// Largest error of a sum, within the digits of a typed coefficient.
+const TOLERANCE: f64 = 1e-10;
+
+/// A method that the reader has typed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Given {
+    /// The tableaus of positions and of velocities.
+    pub(super) pair: Pair,
+    /// The times of the stages, which the sums of the rows should be.
+    c: Option<Vec<f64>>,
+    /// The embedded method.
+    pub(super) embedded: Option<Pair>,
+}
+
+impl Given {
+    /// A method by its tableaus only.
+    pub const fn new(pair: Pair) -> Self {
+        Self {
+            pair,
+            c: None,
+            embedded: None,
+        }
+    }
+
+    /// The same with the times of the stages, to which the rows of `a` are compared.
+    ///
+    /// # Errors
+    /// There is not one finite time for each stage.
+    pub fn with_times(self, c: &[f64]) -> Result<Self, TableauError> {
+        Tableau::new(self.pair.v().a(), c)?;
+        let c = Some(c.to_vec());
+        Ok(Self { c, ..self })
+    }
+
+    /// The same with the weights of an embedded method, which has the `a` of the velocities.
+    ///
+    /// # Errors
+    /// There is not one finite weight for each stage.
+    pub fn with_embedded(self, b_hat: &[f64]) -> Result<Self, TableauError> {
+        let embedded = Pair::same(Tableau::new(self.pair.v().a(), b_hat)?);
+        Ok(Self {
+            embedded: Some(embedded),
+            ..self
+        })
+    }
+}
+
+/// A number as a fraction with a denominator of at most 10000, or with its digits.
+pub(super) fn fraction(value: f64) -> String {
+    let fits = |denominator: &i32| {
+        let numerator = value * f64::from(*denominator);
+        (numerator - numerator.round()).abs() <= 1e-12 * f64::from(*denominator)
+    };
+    match (1..=10_000).find(fits) {
+        Some(1) => format!("{}", value.round()),
+        Some(denominator) => format!("{}/{denominator}", (value * f64::from(denominator)).round()),
+        None => format!("{value}"),
+    }
+}
+
+/// The sums that are inconsistent.
+pub(super) fn faults(given: &Given) -> Vec<String> {
+    let mut faults = Vec::new();
+    let mut weights = |name: &str, b: &[f64]| {
+        let sum: f64 = b.iter().sum();
+        if (sum - 1.0).abs() > TOLERANCE {
+            faults.push(format!("{name} sums to {}", fraction(sum)));
+        }
+    };
+    if given.pair.is_runge_kutta() {
+        weights("b", given.pair.v().b());
+    } else {
+        weights("b of q", given.pair.q().b());
+        weights("b of v", given.pair.v().b());
+    }
+    if let Some(embedded) = &given.embedded {
+        weights("b_hat", embedded.v().b());
+    }
+    for (row, (c, a)) in given.c.iter().flatten().zip(given.pair.v().a()).enumerate() {
+        let sum: f64 = a.iter().sum();
+        if (sum - c).abs() > TOLERANCE {
+            let (sum, c) = (fraction(sum), fraction(*c));
+            faults.push(format!("row {row} of a does not sum to c: {sum}, not {c}"));
+        }
+    }
+    faults
+}
