@@ -1,18 +1,16 @@
 //! The registry has every client, topic and service. It fans messages out to subscribers, and routes calls.
 //!
-//! This file has its state, its messages and the path of an op. `joining.rs` has the clients that join and leave,
-//! `subscriptions.rs`, `publishing.rs` and `requests.rs` the rosbridge ops, `encoding.rs` the messages that are encoded in
-//! another form, and `actors/graph/` the tables.
+//! This file has its state, its messages and the path of an op. `clients.rs` has the clients that join and leave and the
+//! frames to them, `topics.rs`, `calls.rs` and `goals.rs` the rosbridge ops, and `actors/graph/` the tables.
 //!
 //! **Invariant:** a message is encoded once for each spelling and form, and not at all without subscribers. A
 //! refused op changes nothing. It gets an error status, or the call's one response. Messages of one sender take effect
 //! in the order sent: the registry has one mailbox, and so has each connection.
 
-mod encoding;
-mod joining;
-mod publishing;
-mod requests;
-mod subscriptions;
+mod calls;
+mod clients;
+mod goals;
+mod topics;
 
 use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 use std::net::IpAddr;
@@ -24,7 +22,7 @@ use bytes::Bytes;
 use tokio::sync::oneshot;
 use tokio::time::Instant;
 
-pub use self::joining::{Connect, CountRefusal, Disconnect, HeldPlace, Retire};
+pub use self::clients::{Connect, CountRefusal, Disconnect, HeldPlace, Retire};
 use crate::actors::ConnectionId;
 use crate::actors::graph::forwarded::ForwardedRequests;
 use crate::actors::graph::providers::Providers;

@@ -1,23 +1,30 @@
-//! Clients join and leave. Also the other requests of the runtime and its nodes.
+//! Clients join and leave, and get their responses, statuses and refusals. Also the other requests of the runtime and its
+//! nodes.
 //!
 //! **Invariant:** a client has one entry from [`Connect`] to [`Disconnect`]. Its registrations end when it stops
 //! sending.
 
 use std::collections::HashSet;
+use std::fmt::Display;
 use std::net::IpAddr;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use actix::prelude::*;
+use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::{Client, Handled, Outlets, Registry, ToClient};
+use super::{Client, FrameOrigin, Handled, Outlets, Registry, ToClient};
 use crate::actors::ConnectionId;
 use crate::actors::graph::registrations::{EntrySum, Registrations};
-use crate::actors::node::{Attach, Barrier, ClientLink, FinishAll, TakeCensus, guard};
-use crate::actors::resources::memory::{MAX_LONG_BACKLOG, Pool};
+use crate::actors::node::{
+    Attach, Barrier, ClientLink, FinishAll, FrameKind, Respond, TakeCensus, Tapped, guard,
+};
+use crate::actors::resources::memory::{MAX_BACKLOG, MAX_LONG_BACKLOG, Pool, SHORT, cover};
 use crate::actors::resources::places::Refused;
-use crate::protocol::messages::ErrorForm;
-use crate::protocol::op::Verbosity;
+use crate::protocol::catalog::Service;
+use crate::protocol::messages::{self, ErrorForm, Level};
+use crate::protocol::op::{GoalStatus, OpError, Verbosity};
 
 /// The place of a registered client. Dropping it frees the place, even if the answer to [`Connect`] is lost.
 pub struct HeldPlace {
@@ -76,7 +83,53 @@ impl Client {
             calls: Some(guard()),
         }
     }
+
+    /// Sends a status, a forwarded call or another client's response.
+    pub(super) fn send(&self, frame: Bytes) {
+        self.respond(frame, None);
+    }
+
+    /// Sends a forwarded call or another client's response, which counts for `MAX_LONG_BACKLOG` if it is long.
+    pub(super) fn send_long(&self, frame: Bytes) {
+        let room = self.long_room.try_take(frame.len());
+        self.send(cover(room.as_ref(), frame));
+    }
+
+    /// Whether a forwarded call or another client's response of this length may wait for it.
+    pub(super) fn has_long_room(&self, bytes: usize) -> bool {
+        bytes <= SHORT || self.long_room.has(bytes)
+    }
+
+    /// Sends a response. `service` is the responding service, if it is the runtime's own.
+    pub(super) fn respond(&self, frame: Bytes, service: Option<Service>) {
+        if frame.len() <= SHORT {
+            self.outlets
+                .backlog
+                .fetch_add(frame.len(), Ordering::Relaxed);
+        }
+        let response = ToClient::Respond { frame, service };
+        self.outlets.mailbox.do_send(response);
+    }
+
+    /// Sends feedback of a goal. It may be dropped.
+    pub(super) fn deliver_feedback(&self, frame: Bytes) {
+        let (topic, at) = (None, Instant::now());
+        let feedback = ToClient::Deliver { topic, frame, at };
+        self.outlets.mailbox.do_send(feedback);
+    }
+
+    /// Bytes of responses that wait to be written to it.
+    pub(super) fn backlog(&self) -> usize {
+        self.outlets.backlog.load(Ordering::Relaxed)
+    }
+
+    /// Whether its short responses wait beyond the limit. Then other clients' calls and answers to it are refused.
+    pub(super) fn is_congested(&self) -> bool {
+        self.backlog() > MAX_BACKLOG
+    }
 }
+
+// ---- the runtime and its nodes --------------------------------------------------------------------------------------
 
 impl Handler<Connect> for Registry {
     type Result = Result<HeldPlace, Refused>;
@@ -167,6 +220,31 @@ impl Handler<TakeCensus> for Registry {
     }
 }
 
+impl Handler<Respond> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
+        let Some(client) = self.clients.get(&respond.connection) else {
+            return;
+        };
+        match respond.kind {
+            FrameKind::Status(level) if !client.verbosity.wants(level) => {}
+            FrameKind::Status(_) | FrameKind::End => client.send(respond.frame),
+            FrameKind::Feedback => client.deliver_feedback(respond.frame),
+            FrameKind::Answer(service) => {
+                if let Some(tap) = &mut self.tap {
+                    tap(Tapped::Answered {
+                        to: respond.connection,
+                        service,
+                        frame: &respond.frame,
+                    });
+                }
+                client.respond(respond.frame, Some(service));
+            }
+        }
+    }
+}
+
 impl Registry {
     /// Withdraws a client's registrations. The cleanup ends the calls and goals that wait for its answer, because there
     /// may be many.
@@ -187,5 +265,36 @@ impl Registry {
         if self.requests.waiting_for(id).is_some() {
             self.gone.push_back(id);
         }
+    }
+
+    /// Answers a frame that has no op: by the response of its call, by the result of its goal, or by a status.
+    pub(super) fn answer_error(&self, origin: &FrameOrigin, why: &OpError) {
+        match why {
+            OpError::Call { service, problem } => self.refuse_call(origin, service, problem, None),
+            OpError::Goal { action, problem } => {
+                self.end_goal(origin, action, problem, GoalStatus::Unknown);
+            }
+            OpError::Status(problem) => self.refuse(origin, problem),
+        }
+    }
+
+    /// Sends an error status with the reason to the sender of a refused frame.
+    pub(super) fn refuse(&self, origin: &FrameOrigin, why: &impl Display) {
+        let why = why.to_string();
+        tracing::debug!(connection = origin.from.0, why, "refused");
+        self.send_status(origin, Level::Error, &why);
+    }
+
+    pub(super) fn send_status(&self, origin: &FrameOrigin, level: Level, msg: &str) {
+        if let Some(client) = self.clients.get(&origin.from)
+            && client.verbosity.wants(level)
+        {
+            client.send(self.covered(messages::status(level, msg, origin.id.as_ref())));
+        }
+    }
+
+    /// The frame with the memory permit of the long frame from which it was made.
+    pub(super) fn covered(&self, frame: Bytes) -> Bytes {
+        cover(self.permit.as_ref(), frame)
     }
 }
