@@ -24,7 +24,8 @@ use crate::actors::compute::long_frames::{LongFrame, LongFrames, Parsed};
 use crate::actors::gateway::limits::{
     DISCARD_TIME, FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, READ_BYTES, RESPONSES_TIME,
 };
-use crate::actors::gateway::registry::{Handled, Request, Retire};
+use crate::actors::gateway::registry::{Request, Retire};
+use crate::actors::node::Completion;
 use crate::actors::resources::long_work::SHORT_WORK;
 use crate::actors::resources::memory::{Permit, time_to_read};
 use crate::actors::resources::turns::{Timer, end_turn};
@@ -334,12 +335,12 @@ impl ClientReader {
             let due = Instant::now() + time_to_read(length);
             return Self::queue(client, request, length, due);
         }
-        let effect = effect(client.registry.send(request));
+        let completed = completed(client.registry.send(request));
         if !may_wait {
-            return ReadStep::Performing(Box::pin(effect));
+            return ReadStep::Performing(Box::pin(completed));
         }
         ReadStep::Performing(Box::pin(unless_closed(
-            effect,
+            completed,
             client.gone.clone(),
             client.ends,
         )))
@@ -457,7 +458,7 @@ impl ClientReader {
         let retired = client.registry.send(Retire(self.id));
         let gone = timeout(RESPONSES_TIME, closed(client.ends));
         let gone = async move { gone.await.unwrap_or_default() };
-        ReadStep::Retiring(Some(Box::pin(effect(retired))), Box::pin(gone))
+        ReadStep::Retiring(Some(Box::pin(completed(retired))), Box::pin(gone))
     }
 
     /// Queues a computation of this connection. Its frame needs no permit there up to [`MEDIUM`], because a connection that
@@ -477,7 +478,7 @@ impl ClientReader {
         {
             let (service, problem) = (service.clone(), Problem::NotAFrame(TOO_LONG.to_owned()));
             request.incoming.op = Err(OpError::Call { service, problem });
-            return ReadStep::Performing(Box::pin(effect(client.registry.send(request))));
+            return ReadStep::Performing(Box::pin(completed(client.registry.send(request))));
         }
         client.computations.push(request, length);
         client.start_computation();
@@ -486,8 +487,8 @@ impl ClientReader {
 }
 
 /// Waits until a request to the registry has taken effect.
-async fn effect(handled: impl Future<Output = Result<Handled, MailboxError>>) {
-    if let Ok(handled) = handled.await {
-        handled.effect().await;
+async fn completed(request: impl Future<Output = Result<Completion, MailboxError>>) {
+    if let Ok(completion) = request.await {
+        completion.wait().await;
     }
 }

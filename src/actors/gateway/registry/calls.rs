@@ -11,12 +11,12 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::{Client, FrameOrigin, Handled, Registry};
+use super::{Client, FrameOrigin, Registry};
 use crate::actors::gateway::limits::DEFAULT_TIMEOUT;
 use crate::actors::graph::forwarded::Forwarded;
 use crate::actors::graph::providers::Provider;
 use crate::actors::graph::refusal::{self, Refusal};
-use crate::actors::node::{Caller, Done, RefuseCalls, ServiceCall, Tapped};
+use crate::actors::node::{Caller, Completion, RefuseCalls, ServiceCall, Tapped};
 use crate::actors::resources::turns::{Timer, end_turn};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, Level};
@@ -50,7 +50,7 @@ impl Registry {
     // ---- to the runtime's own nodes ---------------------------------------------------------------------------------
 
     /// Sends a call to the node or the client that serves it. A failure is the call's one response.
-    pub(super) fn call(&mut self, origin: FrameOrigin, call: CallService) -> Handled {
+    pub(super) fn call(&mut self, origin: FrameOrigin, call: CallService) -> Completion {
         let own = Service::from_name(&call.service);
         let cancelled = self.action_to_cancel(&call.service);
         let refusal = match (self.closed, own, cancelled) {
@@ -76,18 +76,23 @@ impl Registry {
         if let Err(why) = refusal {
             self.refuse_call(&origin, &call.service, &why, own);
         }
-        Handled::at_once()
+        Completion::at_once()
     }
 
     /// Sends a call to the node that serves it, and shows it to the tap. Refuses it if no node does.
-    fn call_node(&mut self, service: Service, origin: FrameOrigin, call: CallService) -> Handled {
+    fn call_node(
+        &mut self,
+        service: Service,
+        origin: FrameOrigin,
+        call: CallService,
+    ) -> Completion {
         let Some(client) = self.clients.get(&origin.from) else {
-            return Handled::at_once();
+            return Completion::at_once();
         };
         let Some(node) = self.nodes.services.get(&service) else {
             let why = NoService::NotServed(call.service.clone());
             self.refuse_call(&origin, &call.service, &why, Some(service));
-            return Handled::at_once();
+            return Completion::at_once();
         };
         if let Some(tap) = &mut self.tap {
             tap(Tapped::Called {
@@ -100,13 +105,13 @@ impl Registry {
         let address = Address::new(service, call.service.into_boxed_str(), origin.id)
             .with_errors(client.error_form);
         let (link, memory) = (client.link.clone(), self.gauges.memory().clone());
-        let (caller, ended) = Caller::new(link, address, memory, self.permit.clone());
+        let (caller, completion) = Caller::new(link, address, memory, self.permit.clone());
         node(ServiceCall {
             service,
             arguments: call.args,
             caller,
         });
-        Handled::with(ended)
+        completion
     }
 
     // ---- to clients that serve --------------------------------------------------------------------------------------
@@ -223,10 +228,10 @@ impl Registry {
         let Some(caller) = self.clients.get(&origin.from) else {
             return Ok(());
         };
-        let (spelling, done) = match kind {
+        let (spelling, working) = match kind {
             Served::Service => (
                 None,
-                caller.calls.as_ref().map(|(done, _)| Done::clone(done)),
+                caller.calls.as_ref().map(|(working, _)| working.clone()),
             ),
             Served::Action => (Some(provider.spelling.clone()), None),
         };
@@ -242,7 +247,7 @@ impl Registry {
             spelling,
             wants_feedback: request.wants_feedback,
             is_cancelled: false,
-            _done: done,
+            _working: working,
             _entry: caller.entries.enter(bytes, None)?,
         });
         if let Some(server) = server {

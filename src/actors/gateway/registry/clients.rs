@@ -14,11 +14,11 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::{Client, FrameOrigin, Handled, Outlets, Registry, ToClient};
+use super::{Client, FrameOrigin, Outlets, Registry, ToClient};
 use crate::actors::ConnectionId;
 use crate::actors::graph::registrations::{EntrySum, Registrations};
 use crate::actors::node::{
-    Attach, Barrier, ClientLink, FinishAll, FrameKind, Respond, TakeCensus, Tapped, guard,
+    Attach, Barrier, ClientLink, Completion, FinishAll, FrameKind, Respond, TakeCensus, Tapped,
 };
 use crate::actors::resources::memory::{MAX_BACKLOG, MAX_LONG_BACKLOG, Pool, SHORT, cover};
 use crate::actors::resources::places::Refused;
@@ -56,10 +56,10 @@ pub struct Connect {
 #[rtype(result = "()")]
 pub struct CountRefusal;
 
-/// The client has stopped sending. The registry withdraws its registrations. From its connection. The effect of
-/// [`Handled`] ends when the client's calls have been answered.
+/// The client has stopped sending. The registry withdraws its registrations. From its connection. The
+/// answer completes when the client's calls have been answered.
 #[derive(Message)]
-#[rtype(result = "Handled")]
+#[rtype(result = "Completion")]
 pub struct Retire(pub ConnectionId);
 
 /// The client has disconnected, and its output is gone. The registry frees its place. From its connection. Idempotent.
@@ -80,7 +80,7 @@ impl Client {
             verbosity: Verbosity::ALL,
             error_form: ErrorForm::default(),
             listening: Arc::default(),
-            calls: Some(guard()),
+            calls: Some(Completion::pending()),
         }
     }
 
@@ -165,13 +165,13 @@ impl Handler<CountRefusal> for Registry {
 }
 
 impl Handler<Retire> for Registry {
-    type Result = Handled;
+    type Result = Completion;
 
-    fn handle(&mut self, Retire(id): Retire, _: &mut Context<Self>) -> Handled {
+    fn handle(&mut self, Retire(id): Retire, _: &mut Context<Self>) -> Completion {
         self.withdraw(id);
         let client = self.clients.get_mut(&id);
         let calls = client.and_then(|client| client.calls.take());
-        calls.map_or_else(Handled::at_once, |(_, all_ended)| Handled::with(all_ended))
+        calls.map_or_else(Completion::at_once, |(_, all)| all)
     }
 }
 

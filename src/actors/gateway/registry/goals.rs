@@ -8,9 +8,11 @@ use std::sync::Arc;
 use serde_json::json;
 
 use super::calls::ToForward;
-use super::{FrameOrigin, Handled, Registry};
+use super::{FrameOrigin, Registry};
 use crate::actors::graph::refusal::Refusal;
-use crate::actors::node::{ActionClient, ActionRequest, CancelSent, ForwardGoal, Route, guard};
+use crate::actors::node::{
+    ActionClient, ActionRequest, CancelSent, Completion, ForwardGoal, Route,
+};
 use crate::actors::resources::memory::{MAX_BACKLOG, cover_message};
 use crate::protocol::catalog::Action;
 use crate::protocol::messages;
@@ -20,15 +22,15 @@ use crate::protocol::wire::json::Payload;
 
 impl Registry {
     /// Sends a goal to the node, or the client, that serves its action. A failure is the goal's one result.
-    pub(super) fn send_action_goal(&mut self, origin: FrameOrigin, goal: ActionGoal) -> Handled {
+    pub(super) fn send_action_goal(&mut self, origin: FrameOrigin, goal: ActionGoal) -> Completion {
         let Some(client) = self.clients.get(&origin.from) else {
-            return Handled::at_once();
+            return Completion::at_once();
         };
         let refusal = match (self.closed, Action::from_name(&goal.action)) {
             (Some(why), _) => Err(Refusal::Closed(why)),
             (None, Some(action)) => match self.action_route(action, &goal) {
                 Ok(node) => {
-                    let (done, ended) = guard();
+                    let (working, completion) = Completion::pending();
                     let client = ActionClient {
                         link: client.link.clone(),
                         action: Arc::from(goal.action),
@@ -36,8 +38,12 @@ impl Registry {
                         wants_feedback: goal.feedback,
                     };
                     let goal = goal.args;
-                    node(ActionRequest::Goal(ForwardGoal { goal, client, done }));
-                    return Handled::with(ended);
+                    node(ActionRequest::Goal(ForwardGoal {
+                        goal,
+                        client,
+                        working,
+                    }));
+                    return completion;
                 }
                 Err(why) => Err(why),
             },
@@ -58,7 +64,7 @@ impl Registry {
         if let Err(why) = refusal {
             self.end_goal(&origin, &goal.action, &why, GoalStatus::Unknown);
         }
-        Handled::at_once()
+        Completion::at_once()
     }
 
     /// The node that serves an action of the runtime.
@@ -79,13 +85,13 @@ impl Registry {
     }
 
     /// Cancels a goal of the same client.
-    pub(super) fn cancel_action_goal(&self, origin: &FrameOrigin, action: &str) -> Handled {
+    pub(super) fn cancel_action_goal(&self, origin: &FrameOrigin, action: &str) -> Completion {
         let at_node = self.cancel_at_node(origin, action, origin.id.clone(), false);
         at_node.unwrap_or_else(|| {
             if let Err(why) = self.forward_cancellation(origin, action) {
                 self.refuse(origin, &why);
             }
-            Handled::at_once()
+            Completion::at_once()
         })
     }
 
@@ -97,17 +103,17 @@ impl Registry {
         action: &str,
         id: Option<Payload>,
         all: bool,
-    ) -> Option<Handled> {
+    ) -> Option<Completion> {
         let node = self.nodes.actions.get(&Action::from_name(action)?)?;
         let link = self.clients.get(&origin.from)?.link.clone();
-        let (done, ended) = guard();
+        let (working, completion) = Completion::pending();
         node(ActionRequest::Cancel(CancelSent {
             link,
             id,
             all,
-            done,
+            working,
         }));
-        Some(Handled::with(ended))
+        Some(completion)
     }
 
     /// The action whose goals a call of this service cancels, unless a client provides the service itself.
@@ -129,7 +135,7 @@ impl Registry {
         origin: &FrameOrigin,
         call: &CallService,
         action: &str,
-    ) -> Result<Handled, Refusal> {
+    ) -> Result<Completion, Refusal> {
         let mut args = call.args.get().bytes();
         if !args.all(|byte| b"{}[] \t\r\n".contains(&byte)) {
             return Err(Refusal::OneGoal);
@@ -138,7 +144,7 @@ impl Registry {
             Some(handled) => handled,
             None => {
                 self.forward_all_cancellations(action)?;
-                Handled::at_once()
+                Completion::at_once()
             }
         };
         let values = json!({"return_code": 0, "goals_canceling": []});

@@ -19,7 +19,6 @@ use std::sync::atomic::{AtomicU64, AtomicUsize};
 
 use actix::prelude::*;
 use bytes::Bytes;
-use tokio::sync::oneshot;
 use tokio::time::Instant;
 
 pub use self::clients::{Connect, CountRefusal, Disconnect, HeldPlace, Retire};
@@ -30,7 +29,7 @@ use crate::actors::graph::registrations::{EntrySum, Registrations};
 use crate::actors::graph::subscribers;
 use crate::actors::graph::topics::Topics;
 pub use crate::actors::node::{Attach, FinishAll, Nodes, RefuseCalls, SetTap, Tapped};
-use crate::actors::node::{ClientLink, Done, Tap};
+use crate::actors::node::{ClientLink, Completion, Tap, Working};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::gone::Gone;
 use crate::actors::resources::memory::{Permit, Pool};
@@ -93,9 +92,9 @@ struct Client {
     error_form: ErrorForm,
     /// Replaced when the client unsubscribes from the feedback of its goals, and dropped with the client.
     listening: Arc<()>,
-    /// The guard that its calls to other clients share, and the receiver that ends with them. Removed when the client
+    /// What its calls to other clients hold, and the completion of all of them. Removed when the client
     /// stops sending.
-    calls: Option<(Done, oneshot::Receiver<()>)>,
+    calls: Option<(Working, Completion)>,
 }
 
 /// The sender of the frame that is being performed, and the frame's `id`.
@@ -133,28 +132,28 @@ impl Actor for Registry {
 }
 
 impl Handler<Request> for Registry {
-    type Result = Handled;
+    type Result = Completion;
 
-    fn handle(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
+    fn handle(&mut self, request: Request, ctx: &mut Context<Self>) -> Completion {
         let Request { from, incoming, .. } = request;
         if !self.clients.contains_key(&from) {
-            return Handled::at_once();
+            return Completion::at_once();
         }
         let Incoming { id, op } = incoming;
         let origin = FrameOrigin { from, id };
         self.permit = request.permit;
-        let handled = match op {
+        let completion = match op {
             Ok(op) => self.perform(origin, op, ctx),
             Err(why) => {
                 self.answer_error(&origin, &why);
-                Handled::at_once()
+                Completion::at_once()
             }
         };
         let permit = self.permit.take();
-        if let Some(permit) = permit.filter(|_| handled.0.is_none()) {
+        if let Some(permit) = permit.filter(|_| completion.is_at_once()) {
             permit.trim();
         }
-        handled
+        completion
     }
 }
 
@@ -162,7 +161,7 @@ impl Handler<Request> for Registry {
 
 impl Registry {
     /// Performs one op of a registered client.
-    fn perform(&mut self, origin: FrameOrigin, op: Op, ctx: &mut Context<Self>) -> Handled {
+    fn perform(&mut self, origin: FrameOrigin, op: Op, ctx: &mut Context<Self>) -> Completion {
         let refusal = match op {
             Op::Publish { topic, msg } => return self.publish(origin, &topic, msg, ctx),
             Op::PublishLines(lines) => return self.publish_lines(origin.from, &lines, ctx),
@@ -201,7 +200,7 @@ impl Registry {
         if let Err(why) = refusal {
             self.refuse(&origin, &why);
         }
-        Handled::at_once()
+        Completion::at_once()
     }
 }
 
@@ -218,9 +217,9 @@ pub struct Outlets {
     pub gone: Gone,
 }
 
-/// One frame of a client. From its connection, which waits for [`Handled`] before it continues to read.
+/// One frame of a client. From its connection, which waits for [`Completion`] before it continues to read.
 #[derive(Message)]
-#[rtype(result = "Handled")]
+#[rtype(result = "Completion")]
 pub struct Request {
     /// The client.
     pub from: ConnectionId,
@@ -228,33 +227,6 @@ pub struct Request {
     pub incoming: Incoming,
     /// The memory permit of a long frame. All forms made of the frame share it.
     pub permit: Option<Permit>,
-}
-
-/// The op has been routed. A node, or the encoding of a long message, may still be at work on it. The receiver ends
-/// after that.
-#[derive(MessageResponse, Default)]
-pub struct Handled(Option<oneshot::Receiver<()>>);
-
-impl Handled {
-    /// The op has already taken effect.
-    #[must_use]
-    pub fn at_once() -> Self {
-        Self::default()
-    }
-
-    /// A node has the op, or its long message is being encoded.
-    #[must_use]
-    pub fn with(effect: oneshot::Receiver<()>) -> Self {
-        Self(Some(effect))
-    }
-
-    /// Waits until the op has taken effect.
-    pub async fn effect(self) {
-        if let Some(effect) = self.0 {
-            // The sender never sends: dropping it is the signal.
-            let _ = effect.await;
-        }
-    }
 }
 
 /// The registry's messages to a connection, in one order.

@@ -12,13 +12,13 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::{FrameOrigin, Handled, Registry, Subscriber, ToClient};
+use super::{FrameOrigin, Registry, Subscriber, ToClient};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::MAX_LONG_FORMS;
 use crate::actors::graph::forms::{Made, ToEncode};
 use crate::actors::graph::refusal::{self, Refusal};
 use crate::actors::graph::subscribers::Subscription;
-use crate::actors::node::{Done, Interest, Publish, SetTap, Tapped, TopicMessage, guard};
+use crate::actors::node::{Completion, Interest, Publish, SetTap, Tapped, TopicMessage, Working};
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::actors::resources::memory::cover_message;
 use crate::protocol::catalog::{Topic, types};
@@ -206,31 +206,31 @@ impl Registry {
         topic: &str,
         msg: Payload,
         ctx: &mut Context<Self>,
-    ) -> Handled {
+    ) -> Completion {
         let own = match refusal::check_published(topic) {
             Ok(own) => own,
             Err(why) => {
                 self.refuse(&origin, &why);
-                return Handled::at_once();
+                return Completion::at_once();
             }
         };
         let topic = &*names::absolute(topic);
         let Some(client) = self.clients.get(&origin.from) else {
-            return Handled::at_once();
+            return Completion::at_once();
         };
         let node = own
             .filter(|topic| !client.withdrawn.contains(topic))
             .and_then(|topic| Some((topic, self.nodes.subscribers.get(&topic)?)));
         if node.is_none() && !client.registered.advertised.contains_key(topic) {
-            return Handled::at_once();
+            return Completion::at_once();
         }
         let encode = |spelling: &str| messages::publish_raw(spelling, &msg);
         let long = self.fan_out(topic, encode);
         let Some((topic, node)) = node else {
             return self.finish_delivery(long, ctx);
         };
-        let (done, ended) = guard();
-        self.encode_on_worker(long, &done, ctx);
+        let (working, completion) = Completion::pending();
+        self.encode_on_worker(long, &working, ctx);
         if let Some(tap) = &mut self.tap {
             let frame = messages::publish_raw(topic.name(), &msg);
             tap(Tapped::Published(topic, &frame));
@@ -240,9 +240,9 @@ impl Registry {
             link: client.link.clone(),
             listening: Arc::downgrade(&client.listening),
             id: origin.id,
-            done,
+            working,
         });
-        Handled::with(ended)
+        completion
     }
 
     /// Delivers messages of a client unchanged, if it advertises the topic.
@@ -251,11 +251,11 @@ impl Registry {
         from: ConnectionId,
         lines: &Series,
         ctx: &mut Context<Self>,
-    ) -> Handled {
+    ) -> Completion {
         let topic = &*lines.topic;
         let client = self.clients.get(&from);
         if client.is_none_or(|client| !client.registered.advertised.contains_key(topic)) {
-            return Handled::at_once();
+            return Completion::at_once();
         }
         let encode = |spelling: &str| messages::respelled(topic, spelling, &lines.frames);
         self.finish_delivery(self.fan_out(topic, encode), ctx)
@@ -297,13 +297,13 @@ impl Registry {
     }
 
     /// Ends the delivery of a client's message. The client waits for the encoding of a long one.
-    fn finish_delivery(&self, long: Vec<ToEncode>, ctx: &mut Context<Self>) -> Handled {
+    fn finish_delivery(&self, long: Vec<ToEncode>, ctx: &mut Context<Self>) -> Completion {
         if long.is_empty() {
-            return Handled::at_once();
+            return Completion::at_once();
         }
-        let (done, ended) = guard();
-        self.encode_on_worker(long, &done, ctx);
-        Handled::with(ended)
+        let (working, completion) = Completion::pending();
+        self.encode_on_worker(long, &working, ctx);
+        completion
     }
 
     // ---- forms of a message -----------------------------------------------------------------------------------------
@@ -322,9 +322,9 @@ impl Registry {
     }
 
     /// Encodes long messages on worker threads, and delivers them.
-    fn encode_on_worker(&self, long: Vec<ToEncode>, done: &Done, ctx: &mut Context<Self>) {
+    fn encode_on_worker(&self, long: Vec<ToEncode>, working: &Working, ctx: &mut Context<Self>) {
         for message in long {
-            let done = Done::clone(done);
+            let working = working.clone();
             let kind = WorkKind::of(message.plain.len());
             let count = message.recipients.len() as u64;
             let making = run_long_work(kind, move || (message.make(), message));
@@ -333,7 +333,7 @@ impl Registry {
                     Some((made, message)) => registry.deliver_made(&message, &made),
                     None => registry.gauges.add_dropped(count),
                 }
-                drop(done);
+                drop(working);
             }));
         }
     }
