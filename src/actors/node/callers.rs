@@ -57,10 +57,10 @@ pub struct Caller {
     link: ClientLink,
     /// None once the answer has been given.
     address: Option<Address>,
-    /// The room that is taken for the long frame that asked.
-    permit: Option<Permit>,
-    /// The room that is taken for a long answer.
-    room: Option<Permit>,
+    /// The permit of the long frame that asked.
+    frame_permit: Option<Permit>,
+    /// The permit of a long answer.
+    answer_permit: Option<Permit>,
     pub(super) working: Option<Working>,
     /// The pools for long answers.
     memory: Memory,
@@ -69,7 +69,6 @@ pub struct Caller {
 impl Caller {
     /// The client that called the service of `address`. `memory` has the pools for long answers, and `permit` is that
     /// of the call's frame, if it was long. The receiver ends with the call.
-    #[must_use]
     pub fn new(
         link: ClientLink,
         address: Address,
@@ -80,8 +79,8 @@ impl Caller {
         let caller = Self {
             link,
             address: Some(address),
-            permit,
-            room: None,
+            frame_permit: permit,
+            answer_permit: None,
             working: Some(working),
             memory,
         };
@@ -109,13 +108,16 @@ impl Caller {
         let id = self.id().map_or(0, |id| id.get().len());
         let bytes = bytes.saturating_add(id);
         // Two callers that kept a part each, and waited for more, could wait for each other.
-        self.room = None;
+        self.answer_permit = None;
         if bytes > SHORT {
-            let limit = self.permit.as_ref().map_or(Duration::MAX, |_| PERMIT_TIME);
-            let room = timeout(limit, self.memory.answer(bytes));
+            let limit = self
+                .frame_permit
+                .as_ref()
+                .map_or(Duration::MAX, |_| PERMIT_TIME);
+            let permit = timeout(limit, self.memory.answer(bytes));
             tokio::select! {
                 biased;
-                room = room => self.room = Some(room.map_err(|_| Unserved::NO_MEMORY)?),
+                permit = permit => self.answer_permit = Some(permit.map_err(|_| Unserved::NO_MEMORY)?),
                 () = self.link.gone.wait() => {}
             }
         }
@@ -138,7 +140,7 @@ impl Caller {
     /// Answers, unless that has been done.
     fn answer(&mut self, working: Option<Working>, write: impl FnOnce(&Address) -> Bytes) {
         if let Some(address) = self.address.take() {
-            let permit = self.room.as_ref().or(self.permit.as_ref());
+            let permit = self.answer_permit.as_ref().or(self.frame_permit.as_ref());
             let frame = cover(permit, write(&address));
             let kind = FrameKind::Answer(address.service());
             self.link.send(kind, frame, working);

@@ -90,7 +90,7 @@ enum ReadStep {
     /// It waits until an op has taken effect.
     Performing(BoxFuture<()>),
     /// It waits for the memory permit of the incoming long frame.
-    WaitingForRoom(BoxFuture<Result<Permit, ClientLost>>),
+    WaitingForPermit(BoxFuture<Result<Permit, ClientLost>>),
     /// A computation whose frame keeps its permit waits for the earlier ones of its client. Its length, and the deadline.
     AwaitingTurn(Option<Box<Request>>, usize, Instant),
     /// It reads a long frame, or joins pieces.
@@ -122,10 +122,12 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
                     ready!(op.as_mut().poll(cx));
                     Ok(ReadStep::Cutting)
                 }
-                ReadStep::WaitingForRoom(room) => ready!(room.as_mut().poll(cx)).map(|permit| {
-                    reader.long.hold(permit);
-                    ReadStep::Reading
-                }),
+                ReadStep::WaitingForPermit(permit) => {
+                    ready!(permit.as_mut().poll(cx)).map(|permit| {
+                        reader.long.hold(permit);
+                        ReadStep::Reading
+                    })
+                }
                 ReadStep::AwaitingTurn(request, length, due) => {
                     if !client.computations.is_empty() {
                         ready!(reader.timer.poll(Some(*due), cx));
@@ -248,7 +250,7 @@ impl ClientReader {
                 self.chunk.clear();
                 ReadStep::Reading
             }
-            None if is_long_coming && self.long.permit.is_none() => self.wait_for_room(client),
+            None if is_long_coming && self.long.permit.is_none() => self.wait_for_permit(client),
             None => ReadStep::Reading,
         }))
     }
@@ -349,11 +351,11 @@ impl ClientReader {
     // ---- waits and their deadlines ----------------------------------------------------------------------------------
 
     /// Waits for the memory permit of the incoming long frame.
-    fn wait_for_room<S>(&mut self, client: &Connection<S>) -> ReadStep {
+    fn wait_for_permit<S>(&mut self, client: &Connection<S>) -> ReadStep {
         self.frame_due = None;
         let (memory, ends) = (client.gauges.memory().clone(), client.ends);
         // The end of the stream comes after bytes that are not read without a permit.
-        ReadStep::WaitingForRoom(Box::pin(async move {
+        ReadStep::WaitingForPermit(Box::pin(async move {
             tokio::select! {
                 biased;
                 permit = memory.long_frame() => Ok(permit),
@@ -447,9 +449,10 @@ impl ClientReader {
     /// The reader of a client that is not served any more.
     pub(super) fn discarding<S: ClientStream>(client: &mut Connection<S>) -> Self {
         client.leave();
-        let mut reader = Self::default();
-        reader.step = ReadStep::Discarding(0, Instant::now() + DISCARD_TIME);
-        reader
+        Self {
+            step: ReadStep::Discarding(0, Instant::now() + DISCARD_TIME),
+            ..Self::default()
+        }
     }
 
     /// Withdraws the client's registrations, because it can no longer answer calls.

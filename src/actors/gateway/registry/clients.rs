@@ -91,8 +91,8 @@ impl Client {
 
     /// Sends a forwarded call or another client's response, which counts for `MAX_LONG_BACKLOG` if it is long.
     pub(super) fn send_long(&self, frame: Bytes) {
-        let room = self.long_room.try_take(frame.len());
-        self.send(cover(room.as_ref(), frame));
+        let permit = self.long_room.try_take(frame.len());
+        self.send(cover(permit.as_ref(), frame));
     }
 
     /// Whether a forwarded call or another client's response of this length may wait for it.
