@@ -16,16 +16,14 @@ mod goals;
 mod questions;
 mod registry;
 mod routes;
-mod tap;
 
 pub use self::callers::{Caller, ServiceCall, TopicMessage};
 pub use self::completion::{Completion, Working};
 pub use self::goals::{ActionClient, ActionRequest, CancelSent, ForwardGoal, Goal};
 pub use self::questions::{Asker, Call, Reply, Reserving, ShutDown, Unserved, ask};
 pub use self::registry::{
-    Barrier, ClientLink, FinishAll, FrameKind, FrameOut, Interest, Publish, RefuseCalls, Respond,
-    TakeCensus,
+    Barrier, ClientLink, FinishAll, FrameKind, Interest, Publish, RefuseCalls, Respond, SetTap,
+    TakeCensus, Tap, Tapped,
 };
 pub use self::routes::{Attach, Nodes, Route};
-pub use self::tap::{SetTap, Tap, Tapped};
 pub use crate::services::{Address, Answered, Ask, Callable};

@@ -1,4 +1,4 @@
-//! Messages between the registry and the nodes: topics, their interest, and frames for one client.
+//! Messages between the registry and the nodes: topics, their interest, frames for one client, and the tap of the recorder.
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -22,17 +22,14 @@ pub struct Interest {
     pub wanted: bool,
 }
 
-/// Writes a published frame. The registry calls it, so the arm's thread does not have to write.
-pub type FrameOut = Box<dyn FnOnce() -> Bytes + Send>;
-
 /// A message on a topic. From the node that owns it.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Publish {
     /// The topic.
     pub topic: Topic,
-    /// The whole `publish` frame, encoded once.
-    pub frame: FrameOut,
+    /// Writes the whole `publish` frame. The registry calls it, so the arm's thread does not have to write.
+    pub frame: Box<dyn FnOnce() -> Bytes + Send>,
 }
 
 impl Publish {
@@ -127,3 +124,39 @@ pub struct RefuseCalls(pub &'static str);
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct FinishAll;
+
+// ---- the tap --------------------------------------------------------------------------------------------------------
+
+/// A message or call in the registry, as the tap gets it.
+pub enum Tapped<'a> {
+    /// A message on a topic of the runtime, from a node or a client, as the whole `publish` frame.
+    Published(Topic, &'a Bytes),
+    /// A client's call of one of the runtime's services.
+    Called {
+        /// The client.
+        from: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The caller's `id`, if there is one.
+        id: Option<&'a Payload>,
+        /// The arguments.
+        args: &'a Payload,
+    },
+    /// The response to such a call, as the whole frame.
+    Answered {
+        /// The client.
+        to: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The frame.
+        frame: &'a Bytes,
+    },
+}
+
+/// Gets every message and call of the runtime, on the registry's thread. It must not block.
+pub type Tap = Box<dyn FnMut(Tapped<'_>) + Send>;
+
+/// Sets or removes the tap. While a tap is set, every topic of the runtime counts as subscribed. From the recorder.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct SetTap(pub Option<Tap>);

@@ -16,7 +16,6 @@
 
 pub mod flow;
 mod message;
-mod slow;
 mod throttle;
 
 use std::cmp::Ordering;
@@ -109,12 +108,6 @@ struct Writing {
 }
 
 impl Outbox {
-    /// An empty outbox.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Adds a message on a topic, or a series. It is queued, or held back if the topic is throttled. If it does
     /// not fit, the oldest messages are dropped.
     pub fn push(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
@@ -555,15 +548,6 @@ impl Outbox {
     }
 
     // ---- numbers and bytes ------------------------------------------------------------------------------------------
-
-    /// Whether a long topic message waits or is being written. Messages that are held back do not count.
-    #[must_use]
-    pub fn has_long(&self) -> bool {
-        let mut waiting = self.topics.iter();
-        let mut writing = self.writing.iter();
-        waiting.any(|message| message.frame.len() > MEDIUM)
-            || writing.any(|frame| frame.length > MEDIUM && !frame.is_response)
-    }
 
     /// Bytes of waiting responses, including those being written.
     #[must_use]

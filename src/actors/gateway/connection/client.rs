@@ -84,7 +84,7 @@ impl<S: ClientStream> Connection<S> {
             ends,
             registry,
             gauges,
-            outbox: Outbox::new(),
+            outbox: Outbox::default(),
             flow: FlowControl::new(unread, now.into_std()),
             is_single: false,
             backlog: Arc::default(),

@@ -344,10 +344,6 @@ impl Registry {
 
     // ---- the end of requests without an answer ----------------------------------------------------------------------
 
-    pub(super) fn start_cleanup(ctx: &mut Context<Self>) {
-        ctx.spawn(Cleanup::default());
-    }
-
     /// Ends one batch: first calls past their deadlines, then requests of disconnected providers.
     fn clean_up_batch(&mut self) {
         let now = Instant::now();
@@ -373,7 +369,7 @@ impl Registry {
 
 /// Ends calls past their deadlines, and requests of disconnected providers. The actor polls it after each message.
 #[derive(Default)]
-struct Cleanup {
+pub(super) struct Cleanup {
     timer: Timer,
     /// Calls end from this time on, after the process was stopped beyond a deadline.
     sockets_read: Option<Instant>,

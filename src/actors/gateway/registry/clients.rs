@@ -68,22 +68,6 @@ pub struct Retire(pub ConnectionId);
 pub struct Disconnect(pub ConnectionId);
 
 impl Client {
-    fn new(outlets: Outlets, from: IpAddr, link: ClientLink) -> Self {
-        Self {
-            outlets,
-            link,
-            from,
-            entries: EntrySum::default(),
-            registered: Registrations::default(),
-            long_room: Pool::of(MAX_LONG_BACKLOG),
-            withdrawn: HashSet::new(),
-            verbosity: Verbosity::ALL,
-            error_form: ErrorForm::default(),
-            listening: Arc::default(),
-            calls: Some(Completion::pending()),
-        }
-    }
-
     /// Sends a status, a forwarded call or another client's response.
     pub(super) fn send(&self, frame: Bytes) {
         self.respond(frame, None);
@@ -147,7 +131,19 @@ impl Handler<Connect> for Registry {
             connection: id,
             gone: connect.outlets.gone.clone(),
         };
-        let client = Client::new(connect.outlets, connect.from, link);
+        let client = Client {
+            outlets: connect.outlets,
+            link,
+            from: connect.from,
+            entries: EntrySum::default(),
+            registered: Registrations::default(),
+            long_room: Pool::of(MAX_LONG_BACKLOG),
+            withdrawn: HashSet::new(),
+            verbosity: Verbosity::ALL,
+            error_form: ErrorForm::default(),
+            listening: Arc::default(),
+            calls: Some(Completion::pending()),
+        };
         self.clients.insert(id, client);
         self.gauges.set_connections(self.clients.len() as u64);
         let registry = ctx.address();
