@@ -14,6 +14,7 @@
 //! | [`mistakes`] | usual mistakes as models, for the cause of a wrong answer |
 //! | [`report`], [`export`] | the results for a reader, and for programs |
 //! | [`command`] | a whole run |
+//! | [`sabotage`] | servers with a planted fault |
 
 pub mod arm;
 pub mod bench;
@@ -26,6 +27,7 @@ pub mod peer;
 pub mod report;
 pub mod rules;
 pub mod run;
+pub mod sabotage;
 pub mod values;
 
 use std::collections::{BTreeMap, BTreeSet};
