@@ -39,7 +39,7 @@ use pendularm::study::paused::at_once;
 use pendularm::study::planner::{Task, plan};
 use pendularm::study::stability::{Limits, limits};
 use serde_json::{Value, json};
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::mpsc;
 use tokio::time::{sleep, timeout};
 
 fn settings<const N: usize>() -> Present<N> {
