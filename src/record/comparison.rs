@@ -83,7 +83,7 @@ pub enum ReplayError {
     ),
     /// The file ends before a state of the arm.
     #[error("the record was cut before its first state")]
-    FramePart,
+    Truncated,
     /// There is no input, or no state after one.
     #[error("nothing to compare: it has no states of an arm")]
     NoStates,
@@ -137,7 +137,7 @@ impl fmt::Display for ReplayVerdict {
             let gaps = self.losses;
             write!(f, "; {gaps} gaps in the record were left out")?;
         }
-        if self.ending == Some(RecordEnding::FramePart) {
+        if self.ending == Some(RecordEnding::Truncated) {
             write!(f, "; the file ends early, and was read up to there")?;
         }
         if let Some(version) = &self.other_version {
@@ -172,7 +172,7 @@ pub fn replay(file: impl Read) -> Result<ReplayVerdict, ReplayError> {
 /// The error for a record without states, by its end.
 fn no_states(ending: Option<RecordEnding>) -> ReplayError {
     match ending {
-        Some(RecordEnding::FramePart) => ReplayError::FramePart,
+        Some(RecordEnding::Truncated) => ReplayError::Truncated,
         _ => ReplayError::NoStates,
     }
 }

@@ -38,7 +38,7 @@ pub enum RecordEnding {
     /// The file is complete.
     Whole,
     /// The file was truncated, or the program that wrote it was killed.
-    FramePart,
+    Truncated,
 }
 
 /// Why a file cannot be read further.
@@ -98,7 +98,7 @@ impl<R: Read> Recording<R> {
         let message = match self.reader.next() {
             Some(Ok(message)) => message,
             Some(Err(McapError::UnexpectedEof)) => {
-                self.ending = Some(RecordEnding::FramePart);
+                self.ending = Some(RecordEnding::Truncated);
                 return Ok(None);
             }
             Some(Err(error)) => return Err(error.into()),

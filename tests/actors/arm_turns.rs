@@ -20,7 +20,7 @@ use pendularm::actors::arm::sim::{
     Pause, Reset, STEPS_IN_A_ROW, SetParams, Step, TURN_MESSAGES, TakeSnapshot, TrackGoal,
 };
 use pendularm::actors::node::{
-    Ask, Asker, Barrier, Call, Done, Interest, Publish, Reply, ShutDown, Unserved,
+    Ask, Asker, Barrier, Call, Interest, Publish, Reply, ShutDown, Unserved, Working,
 };
 use pendularm::math::arm::Arm;
 use pendularm::math::goal::Criteria;
@@ -47,7 +47,7 @@ struct Client {
 }
 
 impl<T> Asker<T> for Client {
-    fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Done>) {
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Working>) {
         self.answers.lock().unwrap().push(answer.err());
     }
 

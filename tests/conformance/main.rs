@@ -16,9 +16,7 @@
 #[rustfmt::skip]
 mod common;
 mod causes;
-mod faults;
 mod program;
-mod proxy;
 
 use std::collections::BTreeSet;
 use std::net::TcpListener;
@@ -28,12 +26,12 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use pendularm_conformance::bench::Found;
+use pendularm_conformance::sabotage::faults::{self, Planted};
+use pendularm_conformance::sabotage::proxy::{Fault, Proxy, Side};
 use pendularm_conformance::{Results, Row, Rule, Selection, report, rules, run};
 use serde_json::Value;
 
 use common::Runtime;
-use faults::Planted;
-use proxy::{Fault, Proxy, Side};
 
 /// Programs that are tested at once. A rule waits longer than it computes.
 const WORKERS: usize = 16;
@@ -116,7 +114,7 @@ const CAUSES: [(&str, &str); 16] = [
 fn escapes(program: &Runtime, found: &Found, planted: &Planted, links: usize) -> Option<String> {
     let mut outcome = String::new();
     for _ in 0..3 {
-        let proxy = Proxy::start(&program.address.to_string(), planted.fault(links));
+        let proxy = Proxy::start(&program.address.to_string(), planted.fault(links)).unwrap();
         let selection = Selection { rule: Some(planted.rule.to_owned()), ..Selection::default() };
         let rows = run(&proxy.address, &selection, |_, _| {}).map(|results| results.rows);
         // Without the proxy, so the next fault meets the server in its initial state.
@@ -187,7 +185,7 @@ fn services_that_never_answer_fail_their_own_rules_alone() {
         let is_missing = move |name: &Value| missing.split(' ').any(|start| name.as_str().is_some_and(|name| name.starts_with(start)));
         let fault: Fault =
             Box::new(move |_, frame| if is_missing(&frame["service"]) || is_missing(&frame["topic"]) { vec![] } else { vec![frame] });
-        let proxy = Proxy::start(&program.address.to_string(), fault);
+        let proxy = Proxy::start(&program.address.to_string(), fault).unwrap();
         let selection = Selection { rule: Some(rule.to_owned()), ..Selection::default() };
         let rows = run(&proxy.address, &selection, |_, _| {}).unwrap().rows;
         assert!(!rows.is_empty() && rows.iter().all(Row::holds), "{rows:?}");
@@ -212,7 +210,7 @@ fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
         }
         vec![frame]
     });
-    let proxy = Proxy::start(&program.address.to_string(), fault);
+    let proxy = Proxy::start(&program.address.to_string(), fault).unwrap();
     let selection = Selection { category: Some("pid".to_owned()), ..Selection::default() };
     let rows = run(&proxy.address, &selection, |_, _| {}).unwrap().rows;
     let holding: Vec<String> = rows.iter().filter(|row| row.holds()).map(report::line).collect();
@@ -223,7 +221,7 @@ fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
 fn behind(change: impl FnMut(&mut Value) -> bool + Send + 'static, selection: &Selection) -> Results {
     let (program, mut change) = (Runtime::start(), change);
     let fault: Fault = Box::new(move |side, mut frame| if side == Side::Client || change(&mut frame) { vec![frame] } else { vec![] });
-    run(&Proxy::start(&program.address.to_string(), fault).address, selection, |_, _| {}).unwrap()
+    run(&Proxy::start(&program.address.to_string(), fault).unwrap().address, selection, |_, _| {}).unwrap()
 }
 
 fn failing(results: &Results) -> Vec<&str> {
@@ -323,7 +321,7 @@ fn wrong_equations_are_told_before_the_rules_that_rest_on_them() {
         }
         vec![frame]
     });
-    let proxy = Proxy::start(&program.address.to_string(), fault);
+    let proxy = Proxy::start(&program.address.to_string(), fault).unwrap();
     let selection = Selection { category: Some("dynamics and".to_owned()), ..Selection::default() };
     let results = run(&proxy.address, &selection, |_, _| {}).unwrap();
     let (groups, _) = report::failures(&results);

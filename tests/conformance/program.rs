@@ -1,15 +1,16 @@
 //! `pendularm conformance`: its exit status and its files, and addresses without a proper server.
 
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Output, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use pendularm_conformance::sabotage::faults;
+use pendularm_conformance::sabotage::proxy::{Fault, Proxy, Side};
 use serde_json::Value;
 
 use crate::common::{self, Runtime, signal};
-use crate::proxy::{Fault, Proxy, Side};
 
 fn conformance(arguments: &[&str]) -> Output {
     common::program().arg("conformance").args(arguments).output().unwrap()
@@ -93,7 +94,7 @@ fn the_files_have_the_results() {
         }
         vec![frame]
     });
-    let proxy = Proxy::start(&program.address.to_string(), fault);
+    let proxy = Proxy::start(&program.address.to_string(), fault).unwrap();
     let output = conformance(&[&proxy.address, "--rule", "checkpoint", "--json", &json, "--junit", &junit, "--html", &html]);
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     assert!(out(&output).lines().all(|line| line.chars().count() <= 120), "{}", out(&output));
@@ -214,4 +215,74 @@ fn two_runs_at_once_and_other_programs_are_noticed() {
         run.join().unwrap()
     });
     assert!(out(&output).contains("another program moved the arm"), "{}", out(&output));
+}
+
+#[test]
+fn points_of_rules_sections_and_categories_are_added_up() {
+    let path = file("points.toml");
+    let (program, address) = (Runtime::start(), |program: &Runtime| program.address.to_string());
+    let graded = |text: &str, arguments: &[&str]| {
+        std::fs::write(&path, text).unwrap();
+        conformance(&[&[&address(&program), "--points", &path], arguments].concat())
+    };
+    let text = "# worth\n[points]\nmethod-1 = 5  # this one\nmethod = 2\n\"PID control\" = 0.25\n";
+    let json = file("points.json");
+    let output = graded(text, &["--rule", "method", "--json", &json]);
+    let rules = out(&output).matches("\nok   method-").count() + usize::from(out(&output).starts_with("ok   method-"));
+    let all = 2 * rules + 3;
+    assert!(rules > 3 && out(&output).contains(&format!("{rules}, {all} of {all} points")), "{output:?}");
+    let results: Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    assert_eq!(results["all"]["points"], all as f64);
+    let output = graded(text, &["--rule", "gains-1"]);
+    assert!(out(&output).contains("0.25 of 0.25 points"), "{output:?}");
+    for (text, wrong) in [
+        ("method-1", "line 1: must be `name = points`"),
+        ("\nmethods = 2", "line 2: must name a rule, a section or a category"),
+        ("method = -1", "line 1: points must be a number, at least 0"),
+        ("method = 1\nmethod = 2", "line 2: the name has points already"),
+    ] {
+        assert!(common::complaint(&graded(text, &[]), 2).contains(wrong), "{text}");
+    }
+}
+
+/// The first lines of a saboteur with these arguments at a free port, and the exit status after a request to end.
+#[cfg(unix)]
+fn sabotaged(arguments: &[&str], lines: usize, during: impl FnOnce(&str)) -> (Vec<String>, Option<i32>) {
+    let mut command = common::program();
+    let mut child = command.arg("sabotage").args(arguments).arg("127.0.0.1:0").stdout(Stdio::piped()).spawn().unwrap();
+    let mut said = BufReader::new(child.stdout.take().unwrap()).lines();
+    let said: Vec<String> = said.by_ref().take(lines).map(Result::unwrap).collect();
+    let address = said[0].strip_prefix("listening on ").unwrap().split(':').take(2).collect::<Vec<_>>().join(":");
+    let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| during(&address)));
+    signal(child.id(), "TERM");
+    let status = child.wait().unwrap().code();
+    outcome.unwrap();
+    assert!(TcpStream::connect(&address).is_err(), "it still listens");
+    (said, status)
+}
+
+#[cfg(unix)]
+#[test]
+fn a_saboteur_serves_an_arm_whose_fault_is_found_by_the_rules() {
+    let listed = out(&common::program().args(["sabotage", "--list"]).output().unwrap());
+    assert_eq!(listed.lines().count(), faults::all().len());
+    let number = faults::all().iter().position(|planted| planted.rule == "checkpoint-5").unwrap() + 1;
+    let (said, status) = sabotaged(&[&number.to_string(), "--reveal"], 2, |address| {
+        let output = conformance(&[address, "--rule", "checkpoint-5"]);
+        assert_eq!(output.status.code(), Some(1), "{output:?}");
+        assert!(out(&output).contains("positions by midpoint"), "{output:?}");
+        assert_eq!(conformance(&[address, "--rule", "checkpoint-4"]).status.code(), Some(0));
+    });
+    assert_eq!((said[1].as_str(), status), ("checkpoint-5: the server midpoint is euler", Some(0)));
+    let revealed = |seed: &str| sabotaged(&["--seed", seed, "--reveal"], 2, |_| ()).0.remove(1);
+    assert_eq!(revealed("7"), revealed("7"));
+    assert!((8..12).any(|seed| revealed(&seed.to_string()) != revealed("7")));
+    for (arguments, wrong) in [
+        (vec!["0"], "N must be a whole number from 1 to"),
+        (vec!["1", "2"], "one too many"),
+        (vec!["1", "--seed", "2"], "a number or a seed"),
+    ] {
+        let output = common::program().arg("sabotage").args(arguments).output().unwrap();
+        assert!(common::complaint(&output, 2).contains(wrong), "{output:?}");
+    }
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use actix::dev::ToEnvelope;
 use actix::prelude::*;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::node::{Ask, Asker, Call, Done, Reply, Unserved, guard};
+use pendularm::actors::node::{Ask, Asker, Call, Completion, Reply, Unserved, Working};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::sync::oneshot;
 use tokio::time::timeout;
@@ -25,7 +25,7 @@ struct Asking<T> {
 }
 
 impl<T: Send> Asker<T> for Asking<T> {
-    fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Done>) {
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Working>) {
         // The answer is stored before it is reported.
         let _ = self.answer.send(answer);
         let _ = self.answered.send(self.connection);
@@ -39,7 +39,7 @@ impl<T: Send> Asker<T> for Asking<T> {
 /// A pending call: its answer, its end, and a flag that its caller has disconnected.
 pub struct Asked<T> {
     pub answer: oneshot::Receiver<Result<T, Unserved>>,
-    pub ended: oneshot::Receiver<()>,
+    pub completion: Completion,
     pub gone: Arc<AtomicBool>,
 }
 
@@ -51,7 +51,7 @@ pub fn ask_as<A: Ask>(
     ask: A,
 ) -> Asked<A::Answer> {
     let gone = Arc::new(AtomicBool::new(false));
-    let (done, ended) = guard();
+    let (working, completion) = Completion::pending();
     let (give, answer) = oneshot::channel();
     let asking = Asking {
         connection,
@@ -59,11 +59,11 @@ pub fn ask_as<A: Ask>(
         answered: answered.clone(),
         answer: give,
     };
-    let reply = Reply::new(asking, Some(done));
+    let reply = Reply::new(asking, Some(working));
     node.do_send(Call { ask, reply });
     Asked {
         answer,
-        ended,
+        completion,
         gone,
     }
 }

@@ -14,7 +14,7 @@ use pendularm::actors::arm::sim::{
 };
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::Attach;
-use pendularm::actors::node::{Ask, Call, Nodes, Publish, Reply, guard};
+use pendularm::actors::node::{Ask, Call, Completion, Nodes, Publish, Reply};
 use pendularm::actors::start::start_arm;
 use pendularm::math::arm::State;
 use pendularm::math::kinematics::Unreachable;
@@ -96,7 +96,7 @@ impl<const N: usize> Stage<N> {
         let setpoint = Setpoint::at(position);
         let held = SetSetpoint {
             setpoint,
-            done: None,
+            working: None,
         };
         self.arm.send(held).await.unwrap();
     }
@@ -109,14 +109,11 @@ where
     T: Actor<Context = Context<T>> + Handler<Call<A>>,
 {
     let (answered, answer) = oneshot::channel();
-    let (done, ended) = guard();
-    let reply = Reply::new(answered, Some(done));
+    let (working, completion) = Completion::pending();
+    let reply = Reply::new(answered, Some(working));
     node.send(Call { ask, reply }).await.unwrap();
     let answer = answer.await.expect("an asker").expect("an answer");
-    assert!(
-        ended.await.is_err(),
-        "nobody sends the end of a call: it is dropped"
-    );
+    completion.wait().await;
     answer
 }
 

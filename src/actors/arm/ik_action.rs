@@ -16,8 +16,8 @@ use crate::actors::arm::sim::{
     ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal, Tracking,
 };
 use crate::actors::node::{
-    ActionClient, Ask, Asker, Barrier, Call, Callable, CancelSent, Done, ForwardGoal, Goal, Nodes,
-    Publish, Reply, ShutDown, Unserved,
+    ActionClient, Ask, Asker, Barrier, Call, Callable, CancelSent, ForwardGoal, Goal, Nodes,
+    Publish, Reply, ShutDown, Unserved, Working,
 };
 use crate::math::goal::Outcome;
 use crate::math::kinematics::Unreachable;
@@ -137,7 +137,7 @@ impl Asker<Result<String, Unreachable>> for GoalSender {
     fn answer(
         self: Box<Self>,
         answer: Result<Result<String, Unreachable>, Unserved>,
-        _: Option<Done>,
+        _: Option<Working>,
     ) {
         match answer {
             Ok(Ok(_)) => {}
@@ -179,9 +179,13 @@ impl<const N: usize> Handler<ForwardGoal<GoalRequest<N>>> for IkAction<N> {
     type Result = ();
 
     fn handle(&mut self, forwarded: ForwardGoal<GoalRequest<N>>, ctx: &mut Context<Self>) {
-        let ForwardGoal { goal, client, done } = forwarded;
+        let ForwardGoal {
+            goal,
+            client,
+            working,
+        } = forwarded;
         let client = Arc::new(client);
-        let reply = Reply::new(GoalSender(Arc::clone(&client)), Some(done));
+        let reply = Reply::new(GoalSender(Arc::clone(&client)), Some(working));
         self.start_goal(goal, Some(GoalOwner::Client(client)), reply, ctx);
     }
 }
@@ -199,7 +203,7 @@ impl<const N: usize> Handler<CancelSent> for IkAction<N> {
             return cancel.refuse(NOT_ACTIVE);
         };
         let ended = self.end(goal.goal.number, GoalStatus::Canceled);
-        ctx.wait(ended.map(move |_, _, _| drop(cancel.done)));
+        ctx.wait(ended.map(move |_, _, _| drop(cancel.working)));
     }
 }
 

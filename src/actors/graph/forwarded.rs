@@ -9,7 +9,7 @@ use tokio::time::Instant;
 
 use super::registrations::Entry;
 use crate::actors::ConnectionId;
-use crate::actors::node::Done;
+use crate::actors::node::Working;
 use crate::protocol::names::{self, own_id, own_id_number};
 use crate::protocol::op::Served;
 use crate::protocol::wire::json::Payload;
@@ -35,7 +35,7 @@ pub struct Forwarded {
     /// Whether a goal was cancelled with all others of its action. Its server is notified once.
     pub is_cancelled: bool,
     /// A caller that has stopped sending is removed when its last call has ended.
-    pub _done: Option<Done>,
+    pub _working: Option<Working>,
     /// Its part of the caller's limit [`MAX_REGISTERED`](super::registrations::MAX_REGISTERED).
     pub _entry: Entry,
 }

@@ -22,20 +22,25 @@ pub struct Provider {
     type_name: Option<Arc<str>>,
 }
 
+impl Provider {
+    /// The provider that is this client. `spelling` is its spelling of the name.
+    pub fn new(connection: ConnectionId, spelling: &str, type_name: Option<&str>) -> Self {
+        Self {
+            connection,
+            spelling: spelling.into(),
+            type_name: type_name.map(Into::into),
+        }
+    }
+}
+
 impl Providers {
     /// Makes a client the provider of `name`. The newest registration wins. Returns the previous provider.
     pub fn provide(
         &mut self,
         kind: Served,
         name: &str,
-        (connection, spelling): (ConnectionId, &str),
-        type_name: Option<&str>,
+        provider: Provider,
     ) -> Option<ConnectionId> {
-        let provider = Provider {
-            connection,
-            spelling: spelling.into(),
-            type_name: type_name.map(Into::into),
-        };
         let served = self.0.entry(kind).or_default();
         let before = served.insert(name.into(), provider)?;
         Some(before.connection)
@@ -85,8 +90,8 @@ mod tests {
         let mut providers = Providers::default();
         let name = |n: usize| format!("/{n:05}");
         for n in 0..=MAX_LISTED {
-            let provider = (ConnectionId(1), &*name(n));
-            providers.provide(Served::Service, &name(n), provider, None);
+            let provider = Provider::new(ConnectionId(1), &name(n), None);
+            providers.provide(Served::Service, &name(n), provider);
         }
         let topics = (0..=MAX_LISTED).map(|n| Listed {
             name: name(n).into(),

@@ -15,11 +15,12 @@ mod angle;
 mod forward;
 mod inverse;
 
-use glam::DVec2;
-
 use super::shown::{Shown, shown_against};
 
 pub use angle::{nearest_turn, turn, wrap};
+/// A place in the plane \[m\]: `glam`'s vector, so that a caller needs no `glam` of the same version.
+pub use glam::DVec2;
+
 pub use forward::{EndEffector, forward, heading, joints};
 pub use inverse::{BOUNDARY, solve};
 

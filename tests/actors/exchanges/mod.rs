@@ -1,6 +1,7 @@
 //! Exchanges of frames between clients and a whole runtime, in virtual time.
 //!
-//! A text file beside this one has the exchanges of one subject. An exchange begins with `# ` and its statement. It runs against a
+//! A text file beside this one has the exchanges of one subject. An exchange begins with `# ` and its statement, which is
+//! the name of its test, and ends with an empty line. It runs against a
 //! new runtime with an arm of 2 links, which is paused at its starting pose. If its first step is `3 links`, the arm has 3. A line of it is one
 //! step:
 //!
@@ -469,75 +470,30 @@ async fn run<const N: usize>(file: &str, title: &str, steps: &[Step]) -> Result<
     Ok(())
 }
 
-/// Runs the exchanges of a file; each that fails is named with its line.
-fn play(file: &str) {
+/// Runs the exchange of a file with this title.
+fn play(file: &str, title: &str) {
     let path = format!("{}/exchanges/{file}.txt", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&path).unwrap();
     let named = text.lines().map_while(|line| line.strip_prefix("let "));
     let named: Vec<(&str, &str)> = named.map(|line| line.split_once(" = ").unwrap()).collect();
-    let lines: Vec<Step> = text
-        .lines()
-        .map(|line| replace(line, &named))
-        .enumerate()
-        .skip(named.len())
+    let is_title = |line: &str| line.strip_prefix("# ") == Some(title);
+    let begin = text.lines().position(is_title).unwrap();
+    let lines = text.lines().enumerate().skip(begin + 1);
+    let lines = lines.take_while(|(_, line)| !line.is_empty());
+    let steps: Vec<Step> = lines
+        .map(|(number, line)| (number, replace(line, &named)))
         .collect();
-    let mut failures = Vec::new();
-    for exchange in lines
-        .split(|(_, line)| line.is_empty())
-        .filter(|lines| !lines.is_empty())
-    {
-        let ((_, title), steps) = exchange.split_first().unwrap();
-        assert!(title.starts_with("# "), "{file}: no title: {title}");
-        let failure = match unroll(steps).as_slice() {
-            [(_, first), steps @ ..] if first == "3 links" => {
-                in_virtual_time(run::<3>(file, title, steps))
-            }
-            steps => in_virtual_time(run::<2>(file, title, steps)),
-        };
-        failures.extend(failure.err());
-    }
-    assert!(failures.is_empty(), "{}", failures.join("\n"));
-}
-
-/// A test for each file.
-macro_rules! exchanges {
-    ($($(#[$only:meta])* $name:ident: $file:literal,)+) => {
-        $(
-            $(#[$only])*
-            #[test]
-            fn $name() {
-                play($file);
-            }
-        )+
+    let result = match unroll(&steps).as_slice() {
+        [(_, first), steps @ ..] if first == "3 links" => {
+            in_virtual_time(run::<3>(file, title, steps))
+        }
+        steps => in_virtual_time(run::<2>(file, title, steps)),
     };
+    result.unwrap();
 }
 
-exchanges! {
-    topics_of_clients: "topics",
-    services_of_clients: "services",
-    actions_of_clients_and_of_the_runtime: "actions",
-    frames_in_pieces_and_malformed_frames: "frames",
-    messages_in_pieces_and_long_frames: "encodings",
-    names_and_ids: "names",
-    rosapi_and_parameters: "rosapi",
-    messages_and_refusals_of_the_arm: "arm",
-    calls_and_ends_of_connections: "connections",
-    room_for_what_is_long: "memory",
-    places_and_the_way_to_them: "places",
-    goals_of_inverse_kinematics: "goals",
-    trials: "trials",
-    clocks_and_the_estimated_error: "clocks",
-    paths: "paths",
-    frames_for_web_viewers: "tf_web",
-    #[cfg(feature = "web")]
-    exchanges_over_websocket: "web",
-    #[cfg(feature = "web")]
-    life_and_ends_of_websockets: "sockets",
-    #[cfg(feature = "web")]
-    heads_of_requests: "heads",
-    #[cfg(feature = "web")]
-    requests_over_http: "http",
-}
+// A test of each exchange, by `build.rs`.
+include!(concat!(env!("OUT_DIR"), "/exchanges.rs"));
 
 /// Under either prefix, and with or without the leading slash.
 #[test]

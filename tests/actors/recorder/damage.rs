@@ -14,7 +14,7 @@ fn a_record_that_was_cut_anywhere_is_read_up_to_there() {
         let (part, ending) = passages(&file[..length]);
         assert_eq!(
             ending,
-            RecordEnding::FramePart,
+            RecordEnding::Truncated,
             "{length} of {}",
             file.len()
         );

@@ -39,7 +39,7 @@ use pendularm::study::paused::at_once;
 use pendularm::study::planner::{Task, plan};
 use pendularm::study::stability::{Limits, limits};
 use serde_json::{Value, json};
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::mpsc;
 use tokio::time::{sleep, timeout};
 
 fn settings<const N: usize>() -> Present<N> {
@@ -56,7 +56,7 @@ fn settings<const N: usize>() -> Present<N> {
             timestep: 0.002,
             period: ControlPeriod {
                 period: 0.0,
-                delay: true,
+                delay: 1,
             },
             ..ControlLoop::free(Arm::default())
         },

@@ -1,5 +1,8 @@
 //! Light requests among heavy ones, on the pool.
 
+use std::pin::pin;
+use std::task::{Context, Waker};
+
 use super::*;
 use crate::system::in_real_time;
 
@@ -43,7 +46,7 @@ fn light_requests_are_answered_between_slices_of_heavy_ones() {
         assert_eq!(three.next().await, 2);
         assert_eq!(three.next().await, 1);
         heavy.gone.store(true, Ordering::Relaxed);
-        assert!(timeout(PATIENCE, heavy.ended).await.is_ok());
+        assert!(timeout(PATIENCE, heavy.completion.wait()).await.is_ok());
         assert_eq!(bench.next().await, 1);
         assert!(matches!(heavy.answer.await, Ok(Err(Unserved::CALLER_GONE))));
     });
@@ -71,10 +74,12 @@ async fn turns_until_integrated(others: u64) -> u32 {
         method: Some(Method::Rk4),
         ..IntegrationStep::default()
     };
-    let mut honest = ask_as(&integration, 100, &answered, step);
+    let honest = ask_as(&integration, 100, &answered, step);
     sleep(ms(1)).await;
     let mut turns = 0;
-    while honest.ended.try_recv() == Err(oneshot::error::TryRecvError::Empty) {
+    let mut completed = pin!(honest.completion.wait());
+    let mut context = Context::from_waker(Waker::noop());
+    while completed.as_mut().poll(&mut context).is_pending() {
         assert!(pool.turn());
         turns += 1;
     }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::arrows::{PENDULARM, SourceTree};
 
 /// Layers that a layer may import, besides itself. A row names only rows above it.
-const LAYERS: [(&str, &[&str]); 21] = [
+const LAYERS: [(&str, &[&str]); 22] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
@@ -26,11 +26,12 @@ const LAYERS: [(&str, &[&str]); 21] = [
     ("plan", &["math", "study", "value"]),
     ("score", &["math"]),
     ("referee", &["output", "value", "signals"]),
+    ("sabotage", &["output", "signals"]),
     (
         "options",
         &[
             "protocol", "web", "report", "command", "logging", "address", "value", "plan",
-            "referee",
+            "referee", "sabotage",
         ],
     ),
     (
@@ -45,7 +46,7 @@ const LAYERS: [(&str, &[&str]); 21] = [
         "main",
         &[
             "command", "logging", "output", "record", "report", "options", "plan", "score",
-            "actors", "signals", "referee",
+            "actors", "signals", "referee", "sabotage",
         ],
     ),
 ];

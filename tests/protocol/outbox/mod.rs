@@ -32,7 +32,7 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         Self {
-            outbox: Outbox::new(),
+            outbox: Outbox::default(),
             now: Instant::now(),
         }
     }

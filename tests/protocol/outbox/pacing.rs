@@ -72,7 +72,7 @@ impl Link {
         let (began, unread) = (Instant::now(), Rc::new(Cell::new(0)));
         let count = Rc::clone(&unread);
         Self {
-            outbox: Outbox::new(),
+            outbox: Outbox::default(),
             flow: FlowControl::new(Box::new(move || Some(count.get())), began),
             topic: "/t".into(),
             began,

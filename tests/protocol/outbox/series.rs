@@ -83,7 +83,7 @@ fn a_full_outbox_counts_what_it_drops_of_a_long_series() {
         500 * length,
         999 * length,
     ] {
-        let mut outbox = Outbox::new();
+        let mut outbox = Outbox::default();
         let series: String = (0..1000).map(numbered).collect();
         outbox.push(&topic, Bytes::from(series), now);
         fill(&mut outbox, kept, now);
@@ -101,7 +101,7 @@ fn a_throttled_topic_keeps_as_many_of_a_series_as_its_queue_is_long() {
     let topic: Arc<str> = "/x".into();
     let numbered = |n: usize| line("/x", &format!("{{\"n\":{n}}}"));
     for length in [1, 2, 8, 9, 10, 50] {
-        let mut outbox = Outbox::new();
+        let mut outbox = Outbox::default();
         outbox.configure(&topic, Some(throttle(Duration::from_millis(10), length)));
         for series in [0..10, 10..20] {
             let series: String = series.map(numbered).collect();

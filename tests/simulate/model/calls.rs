@@ -6,7 +6,7 @@ use serde_json::Value;
 use serde_json::value::RawValue;
 use tokio::time::Instant;
 
-use super::{Asked, Model, NodeMessage, absolute};
+use super::{Asked, Model, ReceivedFrame, absolute};
 use crate::court::Court;
 use crate::honest::{Expect, Honest};
 use crate::json::Json;
@@ -23,7 +23,7 @@ impl Model {
         &mut self,
         court: &Court,
         honest: &Honest,
-        frame: &NodeMessage<'_>,
+        frame: &ReceivedFrame<'_>,
         text: &str,
     ) {
         let (Some(id), Some(service), Some(args)) = (frame.id, &frame.service, frame.args) else {
@@ -56,7 +56,7 @@ impl Model {
         &mut self,
         court: &Court,
         honest: &mut Honest,
-        frame: &NodeMessage<'_>,
+        frame: &ReceivedFrame<'_>,
         text: &str,
     ) {
         let id = frame.id.map_or("", RawValue::get);
@@ -121,7 +121,7 @@ impl Model {
         &self,
         court: &Court,
         honest: &mut Honest,
-        frame: &NodeMessage<'_>,
+        frame: &ReceivedFrame<'_>,
         text: &str,
     ) {
         let id = frame.id.map_or("", RawValue::get);

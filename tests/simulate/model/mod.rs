@@ -23,7 +23,7 @@ use crate::json::Json;
 /// The members that all frames share.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct NodeMessage<'a> {
+pub struct ReceivedFrame<'a> {
     op: String,
     #[serde(borrow, default, deserialize_with = "there")]
     id: Option<&'a RawValue>,
@@ -158,7 +158,7 @@ impl Model {
     }
 
     fn hear_text(&mut self, court: &Court, honest: &mut Honest, text: &str) {
-        let frame: NodeMessage<'_> = match serde_json::from_str(text) {
+        let frame: ReceivedFrame<'_> = match serde_json::from_str(text) {
             Ok(frame) => frame,
             Err(why) => {
                 return court.wrong(format!("client {} received {text:.200}: {why}", honest.who));
@@ -184,7 +184,7 @@ impl Model {
         &mut self,
         court: &Court,
         honest: &mut Honest,
-        frame: &NodeMessage<'_>,
+        frame: &ReceivedFrame<'_>,
         text: &str,
     ) {
         let msg: Value = serde_json::from_str(text).unwrap_or_default();
@@ -229,7 +229,7 @@ impl Model {
         }
     }
 
-    fn hear_piece(&mut self, court: &Court, honest: &mut Honest, frame: NodeMessage<'_>) {
+    fn hear_piece(&mut self, court: &Court, honest: &mut Honest, frame: ReceivedFrame<'_>) {
         let (Some(id), Some(data), Some(num), Some(total)) =
             (frame.id, frame.data, frame.num, frame.total)
         else {

@@ -17,7 +17,7 @@ use self::answers::{ResultCode, feedback, result};
 use crate::actors::arm::sim::Obstacle;
 use crate::actors::arm::sim::{ArmPose, MoveSetpoint, Pose};
 use crate::actors::node::{
-    ActionClient, Barrier, CancelSent, Done, ForwardGoal, Goal, Nodes, ShutDown, Unserved,
+    ActionClient, Barrier, CancelSent, ForwardGoal, Goal, Nodes, ShutDown, Unserved, Working,
 };
 use crate::math::arm::State;
 use crate::math::goal::{Cadence, Dwell};
@@ -120,7 +120,7 @@ impl<const N: usize> Handler<CancelSent> for PathFollower<N> {
         ctx.wait(halted.map(move |(), _, _| {
             let values = result(ResultCode::Successful, "cancelled");
             goal.client.conclude(values, GoalStatus::Canceled);
-            drop(cancel.done);
+            drop(cancel.working);
         }));
     }
 }
@@ -161,7 +161,11 @@ impl<const N: usize> PathFollower<N> {
         pose: &Pose<N>,
         ctx: &mut Context<Self>,
     ) {
-        let ForwardGoal { goal, client, done } = forwarded;
+        let ForwardGoal {
+            goal,
+            client,
+            working,
+        } = forwarded;
         let start = Waypoint {
             time: 0.0,
             position: pose.state.position,
@@ -192,7 +196,7 @@ impl<const N: usize> PathFollower<N> {
             setpoint: pose.setpoint,
             feedback: Cadence::default(),
         });
-        self.move_setpoint(pose, Some(done), ctx);
+        self.move_setpoint(pose, Some(working), ctx);
     }
 
     /// The next move of the setpoint is due.
@@ -211,7 +215,7 @@ impl<const N: usize> PathFollower<N> {
     }
 
     /// Moves the setpoint to its place on the path at this pose of the arm. Ends a goal that the arm cannot follow.
-    fn move_setpoint(&mut self, pose: &Pose<N>, done: Option<Done>, ctx: &mut Context<Self>) {
+    fn move_setpoint(&mut self, pose: &Pose<N>, working: Option<Working>, ctx: &mut Context<Self>) {
         let Some(goal) = &mut self.active else {
             return;
         };
@@ -244,7 +248,7 @@ impl<const N: usize> PathFollower<N> {
                 Ok(Err(resets)) => node.end_replaced(resets),
                 Err(_) => node.abort(Unserved::NO_ARM.0),
             }
-            drop(done);
+            drop(working);
         }));
     }
 

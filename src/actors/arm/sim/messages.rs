@@ -4,7 +4,7 @@
 
 use actix::prelude::*;
 
-use crate::actors::node::{Barrier, Done, TopicMessage};
+use crate::actors::node::{Barrier, TopicMessage, Working};
 use crate::live::{ArmListener, GoalOrder, GoalProgress, Pose, Tracking};
 use crate::math::kinematics::Unreachable;
 use crate::math::pid::Setpoint;
@@ -103,7 +103,7 @@ pub struct SetSetpoint<const N: usize> {
     /// The joint state to hold.
     pub setpoint: Setpoint<N>,
     /// Dropped when it has taken effect.
-    pub done: Option<Done>,
+    pub working: Option<Working>,
 }
 
 /// Moves the setpoint, if it is still the sender's last one. If not, the answer is the number of resets of the arm. From

@@ -116,7 +116,7 @@ impl<const N: usize> ArmOrder<N> for CommandEffort<N> {
 pub(super) fn subscribe<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
     let hold = |setpoint, message: TopicMessage| SetSetpoint {
         setpoint,
-        done: Some(message.done),
+        working: Some(message.working),
     };
     nodes.subscribe(Topic::JointTrajectory, arm.clone(), read_setpoint, hold);
     let command = |effort, message| CommandEffort { effort, message };

@@ -1,34 +1,34 @@
-//! The actor of one client: its transport, its computations and its output. The handler of the registry's messages fills
-//! the output. The writer drains it, and only the writer writes to the socket of a served client.
+//! The actor of one client: its transport, its computations and its output with its deadlines. The handler of the
+//! registry's messages fills the output, and the writer drains it.
 //!
-//! The writer is polled after each message that the actor has handled, so the contents of the outbox are offered to the
-//! socket in the same turn.
-//!
-//! **Invariant:** a write that the client does not take blocks only this connection, and only until a deadline. The
-//! deadline expires only for a client that is finishing, for which responses have waited without a break, or which takes
-//! too long for bytes that hold a permit. One poll writes a bounded number of bytes.
+//! **Invariant:** a deadline of the output expires only for a client that is finishing, for which responses have waited
+//! without a break, or which takes too long for bytes that hold a permit.
 
 use std::collections::VecDeque;
-use std::pin::Pin;
+use std::mem::replace;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Weak};
 use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
-use bytes::Bytes;
+use bytes::{Bytes, BytesMut};
 use tokio::time::Instant;
 
-use super::transport::{ClientLost, ClientStream, Transport};
+use super::transport::{ClientLost, ClientStream, Protocol, Transport};
 use crate::actors::compute::computations::Computations;
-use crate::actors::gateway::limits::{MAX_RESPONSES_WAITING, WRITE_BYTES, WRITE_FRAMES};
+use crate::actors::gateway::limits::{
+    DISCARD_BYTES, LINGER, MAX_RESPONSES_WAITING, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES,
+};
 use crate::actors::gateway::registry::{HeldPlace, Registry, Request, ToClient};
-use crate::actors::panics::contain;
+use crate::actors::panics::{Contained, contain};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::gone::Gone;
-use crate::actors::resources::turns::{Timer, end_turn};
+use crate::actors::resources::memory::time_to_read;
+use crate::actors::resources::turns::end_turn;
 use crate::actors::resources::unread::Ends;
 use crate::protocol::catalog::Service;
 use crate::protocol::limits::{MEDIUM, SHORT};
+use crate::protocol::messages::{self, Level};
 use crate::protocol::outbox::flow::{FlowControl, UnreadSource};
 use crate::protocol::outbox::{Outbox, Room};
 
@@ -84,7 +84,7 @@ impl<S: ClientStream> Connection<S> {
             ends,
             registry,
             gauges,
-            outbox: Outbox::new(),
+            outbox: Outbox::default(),
             flow: FlowControl::new(unread, now.into_std()),
             is_single: false,
             backlog: Arc::default(),
@@ -102,6 +102,13 @@ impl<S: ClientStream> Connection<S> {
     /// The transport of a client that is served.
     pub(super) fn transport(&mut self) -> Result<&mut Transport<S>, ClientLost> {
         self.transport.as_mut().ok_or(ClientLost::Gone)
+    }
+
+    /// Whether the client is served over WebSocket. Then its frames are messages, which may be binary, and it answers
+    /// the close frame.
+    pub(super) fn is_socket(&self) -> bool {
+        let protocol = self.transport.as_ref().map(|transport| &transport.protocol);
+        matches!(protocol, Some(Protocol::WebSocket(..)))
     }
 
     // ---- into the outbox --------------------------------------------------------------------------------------------
@@ -146,7 +153,7 @@ impl<S: ClientStream> Connection<S> {
 
     /// Takes the next frames out of the outbox, if all previous ones were written. Returns whether there are frames to
     /// write. Nothing is held back from a client whose connection is finishing.
-    fn take_frames(&mut self, now: Instant) -> bool {
+    pub(super) fn take_frames(&mut self, now: Instant) -> bool {
         if self.outbox.is_writing() {
             return true;
         }
@@ -171,7 +178,7 @@ impl<S: ClientStream> Connection<S> {
     }
 
     /// Notes that `bytes` of the frames were written.
-    fn note_written(&mut self, bytes: usize, now: Instant) {
+    pub(super) fn note_written(&mut self, bytes: usize, now: Instant) {
         self.progress = now;
         self.flow.note_written(bytes, now.into_std());
         let (responses, short) = (self.outbox.response_bytes(), self.outbox.short_bytes());
@@ -196,6 +203,117 @@ impl<S: ClientStream> Connection<S> {
     pub(super) const fn may_compute(&self) -> bool {
         self.outbox.response_bytes() <= MAX_RESPONSES_WAITING
     }
+
+    /// Starts the next computation if none runs and not too many responses wait.
+    pub(super) fn start_computation(&mut self) {
+        if self.may_compute()
+            && let Some(request) = self.computations.start()
+        {
+            self.registry.do_send(request);
+        }
+    }
+
+    // ---- deadlines of the output ------------------------------------------------------------------------------------
+
+    /// The deadline of a client that does not take a write. `None` if no response and no bytes with a permit wait,
+    /// unless it is finishing.
+    pub(super) fn stall_deadline(&mut self) -> Option<Instant> {
+        let stalled = match self.responses_since {
+            Some(since) => Some(since.max(self.progress) + STALL_LIMIT),
+            None => self.is_finishing.then(|| self.progress + LINGER),
+        };
+        stalled.into_iter().chain(self.permit_deadline()).min()
+    }
+
+    /// The earliest deadline of the waiting bytes that hold a permit.
+    pub(super) fn permit_deadline(&mut self) -> Option<Instant> {
+        self.permitted.retain(|(_, left)| left.strong_count() > 0);
+        self.permitted.iter().map(|(due, _)| *due).min()
+    }
+
+    /// Notes the deadline of a frame that holds a permit, because it has more than `most` bytes.
+    fn limit_time(&mut self, frame: Bytes, most: usize) -> Bytes {
+        if frame.len() <= most {
+            return frame;
+        }
+        self.permit_deadline();
+        let left = Arc::new(());
+        let due = Instant::now() + time_to_read(frame.len());
+        self.permitted.push_back((due, Arc::downgrade(&left)));
+        Bytes::from_owner(Limited(frame, left))
+    }
+
+    /// The earliest time of the next write, if nothing can be written now. Either a message is throttled, or the client
+    /// must read first.
+    pub(super) fn next_release(&self) -> Option<Instant> {
+        let release = self.outbox.next_release();
+        let waits = self.outbox.has_topics() && !self.outbox.has_responses();
+        let query = self.flow.next_query().filter(|_| waits);
+        let first = release.into_iter().chain(query).min();
+        first.map(Instant::from_std)
+    }
+
+    // ---- the end ----------------------------------------------------------------------------------------------------
+
+    /// Refuses the client: it gets a status with the reason, and its further input is discarded.
+    pub(super) fn refuse(&mut self, why: &str) {
+        self.refuse_with(messages::status(Level::Error, why, None));
+    }
+
+    /// The same, for a reason that is already a status.
+    pub(super) fn refuse_with(&mut self, status: Bytes) {
+        self.is_refused = true;
+        self.backlog.fetch_add(status.len(), Ordering::Relaxed);
+        self.push_response(status, &[]);
+    }
+
+    /// The client is not served any more. Its output remains to be written, but it no longer waits for computations.
+    pub(super) fn leave(&mut self) {
+        self.computations = Computations::default();
+        self.gone.set();
+        self.is_finishing = true;
+    }
+
+    /// Reads and discards the input of a client, up to a limit, if it is refused. `bytes` were discarded before.
+    pub(super) fn poll_discard(
+        &mut self,
+        bytes: &mut usize,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<()> {
+        let Some(transport) = self.transport.as_mut().filter(|_| self.is_refused) else {
+            return Poll::Ready(());
+        };
+        let read = ready!(transport.poll_read(cx, &mut BytesMut::new()));
+        *bytes += read.unwrap_or(0);
+        if read.unwrap_or(0) == 0 || *bytes >= DISCARD_BYTES {
+            return Poll::Ready(());
+        }
+        end_turn(cx)
+    }
+
+    /// Ends the connection if the reader and the writer have ended.
+    pub(super) fn end_half(&mut self, ctx: &mut Context<Self>) -> Poll<()> {
+        if replace(&mut self.half_has_ended, true) {
+            ctx.stop();
+        }
+        Poll::Ready(())
+    }
+
+    /// Ends the writer. The client has time to read the last messages if it is refused, or must send a close frame.
+    pub(super) fn end_writer(&mut self, is_all_written: bool, ctx: &mut Context<Self>) -> Poll<()> {
+        if is_all_written && (self.is_refused || self.is_socket()) {
+            ctx.run_later(LINGER, |_, ctx| ctx.stop());
+            return self.end_half(ctx);
+        }
+        ctx.stop();
+        Poll::Ready(())
+    }
+
+    /// Ends the connection after a panic in `part` of it.
+    pub(super) fn fail(part: &str, panic: &Contained, ctx: &mut Context<Self>) {
+        tracing::error!(%panic, "a client's {part} failed; its connection ends");
+        ctx.stop();
+    }
 }
 
 // ---- the actor ------------------------------------------------------------------------------------------------------
@@ -218,64 +336,14 @@ impl<S: ClientStream> Handler<ToClient> for Connection<S> {
     }
 }
 
-// ---- the writer -----------------------------------------------------------------------------------------------------
+/// A frame whose client has a deadline, until its last byte is written or dropped.
+struct Limited(
+    Bytes,
+    #[expect(dead_code, reason = "it is dropped with the frame")] Arc<()>,
+);
 
-/// The writing half of a connection.
-#[derive(Default)]
-pub(super) struct ClientWriter {
-    pub(super) timer: Timer,
-    /// Deadline of the end of the stream.
-    pub(super) end_due: Option<Instant>,
-}
-
-impl<S: ClientStream> ActorFuture<Connection<S>> for ClientWriter {
-    type Output = ();
-
-    /// Writes the queued messages, until the connection has finished, its client is gone or has stalled for too long.
-    fn poll(
-        mut self: Pin<&mut Self>,
-        client: &mut Connection<S>,
-        ctx: &mut Context<Connection<S>>,
-        cx: &mut task::Context<'_>,
-    ) -> Poll<()> {
-        let (mut written, mut now) = (0, Instant::now());
-        loop {
-            let is_done = client.is_finishing && client.computations.is_empty();
-            let has_frames = client.take_frames(now);
-            let Some(transport) = &mut client.transport else {
-                return client.end_writer(false, ctx);
-            };
-            let (deadline, release) = if has_frames {
-                match transport.poll_write(cx, client.outbox.writing()) {
-                    Poll::Ready(Ok(bytes)) => {
-                        client.note_written(bytes, now);
-                        written += bytes;
-                        // After many bytes, other connections have a turn, and the reader may continue.
-                        if written >= WRITE_BYTES / 2 {
-                            return end_turn(cx);
-                        }
-                        continue;
-                    }
-                    Poll::Ready(Err(_)) => return client.end_writer(false, ctx),
-                    Poll::Pending => {}
-                }
-                (client.stall_deadline(), None)
-            } else if is_done {
-                return self.poll_end(client, ctx, cx);
-            } else {
-                if matches!(transport.poll_flush(cx), Poll::Ready(Err(_))) {
-                    return client.end_writer(false, ctx);
-                }
-                (client.permit_deadline(), client.next_release())
-            };
-            ready!(
-                self.timer
-                    .poll(deadline.into_iter().chain(release).min(), cx)
-            );
-            now = Instant::now();
-            if deadline.is_some_and(|due| due <= now) {
-                return client.end_writer(false, ctx);
-            }
-        }
+impl AsRef<[u8]> for Limited {
+    fn as_ref(&self) -> &[u8] {
+        &self.0
     }
 }

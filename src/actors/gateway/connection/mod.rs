@@ -10,7 +10,6 @@
 
 pub mod admission;
 mod client;
-mod deadlines;
 #[cfg(feature = "web")]
 mod http;
 mod reader;
@@ -20,9 +19,8 @@ mod session;
     allow(dead_code, reason = "only an HTTP request opens a WebSocket")
 )]
 mod transport;
-mod websocket;
+mod writer;
 
-use std::mem::replace;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{self, Poll};
@@ -31,14 +29,14 @@ use actix::fut::wrap_future;
 use actix::prelude::*;
 
 use self::admission::Admission;
-use self::client::ClientWriter;
+
 pub use self::client::Connection;
 use self::reader::ClientReader;
 use self::session::{ClientSession, Opened};
 pub use self::transport::ClientStream;
-use super::limits::LINGER;
+use self::writer::ClientWriter;
 use super::registry::{Outlets, Registry};
-use crate::actors::panics::{Contained, contain};
+use crate::actors::panics::contain;
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::unread;
 pub use crate::actors::resources::unread::Ends;
@@ -102,30 +100,6 @@ impl<S: ClientStream> Connection<S> {
         };
         ctx.spawn(Part("reader", reader));
         ctx.spawn(Part("writer", ClientWriter::default()));
-    }
-
-    /// Ends the connection if the reader and the writer have ended.
-    fn end_half(&mut self, ctx: &mut Context<Self>) -> Poll<()> {
-        if replace(&mut self.half_has_ended, true) {
-            ctx.stop();
-        }
-        Poll::Ready(())
-    }
-
-    /// Ends the writer. The client has time to read the last messages if it is refused, or must send a close frame.
-    fn end_writer(&mut self, is_all_written: bool, ctx: &mut Context<Self>) -> Poll<()> {
-        if is_all_written && (self.is_refused || self.is_socket()) {
-            ctx.run_later(LINGER, |_, ctx| ctx.stop());
-            return self.end_half(ctx);
-        }
-        ctx.stop();
-        Poll::Ready(())
-    }
-
-    /// Ends the connection after a panic in `part` of it.
-    fn fail(part: &str, panic: &Contained, ctx: &mut Context<Self>) {
-        tracing::error!(%panic, "a client's {part} failed; its connection ends");
-        ctx.stop();
     }
 }
 

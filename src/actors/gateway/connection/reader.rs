@@ -3,6 +3,8 @@
 //! The actor polls the reader after each message that it has handled. So the reader may wait for the client's state
 //! without a waker. Work that waits for others is a future of its own, without access to that state.
 //!
+//! The waits for the rest of a frame, for a client that reads nothing, and for the end of its stream have deadlines.
+//!
 //! **Invariant:** the next frame is parsed after the last op has taken effect, except for pure computations. So a
 //! client's requests take effect in the order sent. A series of messages counts as one op. One poll reads a bounded
 //! number of bytes and performs a bounded number of ops. Every frame becomes one op or one error.
@@ -13,50 +15,64 @@ use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
 use bytes::BytesMut;
-use tokio::time::Instant;
+use tokio::time::{Instant, timeout};
 
 use super::client::Connection;
 use super::transport::{ClientLost, ClientStream};
 use crate::actors::ConnectionId;
 use crate::actors::compute::long_frames::{LongFrame, LongFrames, Parsed};
-use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, READ_BYTES};
-use crate::actors::gateway::registry::{Handled, Request, Retire};
+use crate::actors::gateway::limits::{
+    DISCARD_TIME, FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, READ_BYTES, RESPONSES_TIME,
+};
+use crate::actors::gateway::registry::{Request, Retire};
+use crate::actors::node::Completion;
 use crate::actors::resources::long_work::SHORT_WORK;
 use crate::actors::resources::memory::{Permit, time_to_read};
 use crate::actors::resources::turns::{Timer, end_turn};
-use crate::actors::resources::unread::unless_closed;
+use crate::actors::resources::unread::{closed, unless_closed};
 use crate::protocol::catalog::Service;
-use crate::protocol::limits::{MAX_FRAME, SHORT};
-use crate::protocol::op::{self, CallService, Compression, Incoming, Op, Problem, Subscribe};
+use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
+use crate::protocol::op::{
+    self, CallService, Compression, Incoming, Op, OpError, Problem, Subscribe,
+};
+use crate::protocol::wire::fragments::MAX_AGE;
 use crate::protocol::wire::frame::{Foreign, FrameError, FramePart, is_host_line};
 
 /// The error for a client that requests binary frames over raw TCP.
 const NO_BINARY: &str = "subscribe: compression cbor and cbor-raw need WebSocket; \
                          over raw TCP every frame is a line of JSON";
 
+/// The error for a frame that takes longer than [`FRAME_TIME`].
+const TOO_SLOW: &str = "a frame that has begun must be complete within a minute";
+/// The error for a long frame that takes longer than [`LONG_FRAME_TIME`](crate::actors::resources::memory::LONG_FRAME_TIME).
+const TOO_SLOW_LONG: &str = "the rest of a frame of more than 272 KiB must arrive within 5 s";
+/// The error for a long formula behind other computations of its client.
+const TOO_LONG: &str = "a computation of more than 272 KiB waits at most 20 s for earlier ones of its connection; \
+                        call again once they have been answered";
+
 type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 
 /// The reading half of a connection.
 #[derive(Default)]
 pub(super) struct ClientReader {
-    pub(super) step: ReadStep,
-    pub(super) id: ConnectionId,
+    step: ReadStep,
+    id: ConnectionId,
     /// Pieces of a message and the memory permit. While a long frame or a piece is read, its future owns them.
-    pub(super) long: LongFrames,
+    long: LongFrames,
     /// Received bytes that the transport has not read yet.
-    pub(super) chunk: BytesMut,
+    chunk: BytesMut,
     /// The stream has ended. Earlier bytes may still wait.
-    pub(super) has_ended: bool,
+    has_ended: bool,
     /// The last frame has been taken.
     is_last: bool,
     /// Deadline of the incomplete frame. It is set only while the reader waits for the rest.
-    pub(super) frame_due: Option<Instant>,
+    frame_due: Option<Instant>,
     /// While a client that has ended its stream must not be read: the start of this time, and the wait until it has
     /// closed its socket.
-    pub(super) blocked: Option<(Instant, BoxFuture<()>)>,
+    blocked: Option<(Instant, BoxFuture<()>)>,
     /// Whether a JSON object has arrived. Then the client does not use HTTP, because a request has its head first.
     speaks_json: bool,
-    pub(super) timer: Timer,
+    timer: Timer,
     /// Bytes that this poll has given to the transport.
     bytes: usize,
     /// Frames that this poll has taken.
@@ -65,7 +81,7 @@ pub(super) struct ClientReader {
 
 /// The states of the reader.
 #[derive(Default)]
-pub(super) enum ReadStep {
+enum ReadStep {
     /// It reads from the stream.
     #[default]
     Reading,
@@ -74,7 +90,7 @@ pub(super) enum ReadStep {
     /// It waits until an op has taken effect.
     Performing(BoxFuture<()>),
     /// It waits for the memory permit of the incoming long frame.
-    WaitingForRoom(BoxFuture<Result<Permit, ClientLost>>),
+    WaitingForPermit(BoxFuture<Result<Permit, ClientLost>>),
     /// A computation whose frame keeps its permit waits for the earlier ones of its client. Its length, and the deadline.
     AwaitingTurn(Option<Box<Request>>, usize, Instant),
     /// It reads a long frame, or joins pieces.
@@ -106,10 +122,12 @@ impl<S: ClientStream> ActorFuture<Connection<S>> for ClientReader {
                     ready!(op.as_mut().poll(cx));
                     Ok(ReadStep::Cutting)
                 }
-                ReadStep::WaitingForRoom(room) => ready!(room.as_mut().poll(cx)).map(|permit| {
-                    reader.long.hold(permit);
-                    ReadStep::Reading
-                }),
+                ReadStep::WaitingForPermit(permit) => {
+                    ready!(permit.as_mut().poll(cx)).map(|permit| {
+                        reader.long.hold(permit);
+                        ReadStep::Reading
+                    })
+                }
                 ReadStep::AwaitingTurn(request, length, due) => {
                     if !client.computations.is_empty() {
                         ready!(reader.timer.poll(Some(*due), cx));
@@ -232,7 +250,7 @@ impl ClientReader {
                 self.chunk.clear();
                 ReadStep::Reading
             }
-            None if is_long_coming && self.long.permit.is_none() => self.wait_for_room(client),
+            None if is_long_coming && self.long.permit.is_none() => self.wait_for_permit(client),
             None => ReadStep::Reading,
         }))
     }
@@ -319,21 +337,161 @@ impl ClientReader {
             let due = Instant::now() + time_to_read(length);
             return Self::queue(client, request, length, due);
         }
-        let effect = effect(client.registry.send(request));
+        let completed = completed(client.registry.send(request));
         if !may_wait {
-            return ReadStep::Performing(Box::pin(effect));
+            return ReadStep::Performing(Box::pin(completed));
         }
         ReadStep::Performing(Box::pin(unless_closed(
-            effect,
+            completed,
             client.gone.clone(),
             client.ends,
         )))
     }
+
+    // ---- waits and their deadlines ----------------------------------------------------------------------------------
+
+    /// Waits for the memory permit of the incoming long frame.
+    fn wait_for_permit<S>(&mut self, client: &Connection<S>) -> ReadStep {
+        self.frame_due = None;
+        let (memory, ends) = (client.gauges.memory().clone(), client.ends);
+        // The end of the stream comes after bytes that are not read without a permit.
+        ReadStep::WaitingForPermit(Box::pin(async move {
+            tokio::select! {
+                biased;
+                permit = memory.long_frame() => Ok(permit),
+                () = closed(ends) => Err(ClientLost::Gone),
+            }
+        }))
+    }
+
+    /// Refuses the client if an incomplete frame takes too long. Meanwhile drops expired pieces of messages.
+    fn poll_deadlines<S: ClientStream>(
+        &mut self,
+        client: &mut Connection<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<Result<(), ClientLost>> {
+        let transport = client.transport()?;
+        loop {
+            let begin = || Instant::now() + FRAME_TIME;
+            let is_unfinished = transport.is_unfinished();
+            let late = is_unfinished.then(|| *self.frame_due.get_or_insert_with(begin));
+            let began = self.long.fragments.began().map(Instant::from_std);
+            let old = began.map(|began| began + MAX_AGE + LOOK_AGAIN);
+            let first = late.into_iter().chain(old).chain(self.long.due).min();
+            ready!(self.timer.poll(first, cx));
+            let now = Instant::now();
+            if late.is_some_and(|late| late <= now) {
+                transport.give_up(TOO_SLOW)?;
+                client.refuse(TOO_SLOW);
+                return Poll::Ready(Ok(()));
+            }
+            if self.long.due.is_some_and(|due| due <= now) {
+                return Poll::Ready(self.release_late(client));
+            }
+            self.long.fragments.forget_old(now.into_std());
+            self.long.give_back(transport.is_long_coming());
+        }
+    }
+
+    /// Releases the permit of a client that has held it for too long. The client is refused if a long frame is incomplete.
+    /// Pieces of a frame are dropped.
+    fn release_late<S: ClientStream>(
+        &mut self,
+        client: &mut Connection<S>,
+    ) -> Result<(), ClientLost> {
+        let transport = client.transport()?;
+        let is_coming = transport.is_long_coming();
+        self.long = LongFrames::default();
+        if is_coming {
+            transport.give_up(TOO_SLOW_LONG)?;
+            client.refuse(TOO_SLOW_LONG);
+            return Err(ClientLost::Refused);
+        }
+        Ok(())
+    }
+
+    /// Waits until enough was written and computed that the client may be read. Meanwhile reads up to [`READ_BYTES`]
+    /// bytes, to detect the end of the stream. Returns an error if the client has disconnected. A client that has ended
+    /// its stream counts as disconnected if nothing was written for [`RESPONSES_TIME`].
+    fn poll_may_read<S: ClientStream>(
+        &mut self,
+        client: &mut Connection<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<Result<(), ClientLost>> {
+        while !client.may_read() {
+            self.frame_due = None;
+            if self.has_ended {
+                let begin = || (Instant::now(), Box::pin(closed(client.ends)) as _);
+                let (since, closed) = self.blocked.get_or_insert_with(begin);
+                let due = client.progress.max(*since) + RESPONSES_TIME;
+                // The rest of a long frame will not come.
+                self.long = LongFrames::default();
+                if closed.as_mut().poll(cx).is_pending() {
+                    ready!(self.timer.poll(Some(due), cx));
+                }
+                return Poll::Ready(Err(ClientLost::Gone));
+            }
+            if self.timer.poll(self.long.due, cx).is_ready() {
+                self.release_late(client)?;
+                continue;
+            }
+            let transport = client.transport()?;
+            if self.chunk.len() + transport.taken_ahead() >= READ_BYTES {
+                return Poll::Pending;
+            }
+            self.has_ended = ready!(transport.poll_read(cx, &mut self.chunk))? == 0;
+            transport.look_ahead(&mut self.chunk)?;
+        }
+        self.blocked = None;
+        Poll::Ready(Ok(()))
+    }
+
+    /// The reader of a client that is not served any more.
+    pub(super) fn discarding<S: ClientStream>(client: &mut Connection<S>) -> Self {
+        client.leave();
+        Self {
+            step: ReadStep::Discarding(0, Instant::now() + DISCARD_TIME),
+            ..Self::default()
+        }
+    }
+
+    /// Withdraws the client's registrations, because it can no longer answer calls.
+    fn retire<S: ClientStream>(&mut self, client: &Connection<S>) -> ReadStep {
+        self.long = LongFrames::default();
+        let retired = client.registry.send(Retire(self.id));
+        let gone = timeout(RESPONSES_TIME, closed(client.ends));
+        let gone = async move { gone.await.unwrap_or_default() };
+        ReadStep::Retiring(Some(Box::pin(completed(retired))), Box::pin(gone))
+    }
+
+    /// Queues a computation of this connection. Its frame needs no permit there up to [`MEDIUM`], because a connection that
+    /// waits for it reads no other frame. A longer one keeps the permit, so it must begin until `due`.
+    fn queue<S: ClientStream>(
+        client: &mut Connection<S>,
+        mut request: Request,
+        length: usize,
+        due: Instant,
+    ) -> ReadStep {
+        if length <= MEDIUM {
+            request.permit = None;
+        } else if !client.computations.is_empty() && Instant::now() < due {
+            return ReadStep::AwaitingTurn(Some(Box::new(request)), length, due);
+        } else if let Ok(Op::CallService(CallService { service, .. })) = &request.incoming.op
+            && !client.computations.is_empty()
+        {
+            let (service, problem) = (service.clone(), Problem::NotAFrame(TOO_LONG.to_owned()));
+            request.incoming.op = Err(OpError::Call { service, problem });
+            return ReadStep::Performing(Box::pin(completed(client.registry.send(request))));
+        }
+        client.computations.push(request, length);
+        client.start_computation();
+        ReadStep::Cutting
+    }
 }
 
 /// Waits until a request to the registry has taken effect.
-pub(super) async fn effect(handled: impl Future<Output = Result<Handled, MailboxError>>) {
-    if let Ok(handled) = handled.await {
-        handled.effect().await;
+async fn completed(request: impl Future<Output = Result<Completion, MailboxError>>) {
+    if let Ok(completion) = request.await {
+        completion.wait().await;
     }
 }

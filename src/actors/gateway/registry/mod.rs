@@ -1,18 +1,16 @@
 //! The registry has every client, topic and service. It fans messages out to subscribers, and routes calls.
 //!
-//! This file has its state, its messages and the path of an op. `joining.rs` has the clients that join and leave,
-//! `subscriptions.rs`, `publishing.rs` and `requests.rs` the rosbridge ops, `encoding.rs` the messages that are encoded in
-//! another form, and `actors/graph/` the tables.
+//! This file has its state, its messages and the path of an op. `clients.rs` has the clients that join and leave and the
+//! frames to them, `topics.rs`, `calls.rs` and `goals.rs` the rosbridge ops, and `actors/graph/` the tables.
 //!
 //! **Invariant:** a message is encoded once for each spelling and form, and not at all without subscribers. A
 //! refused op changes nothing. It gets an error status, or the call's one response. Messages of one sender take effect
 //! in the order sent: the registry has one mailbox, and so has each connection.
 
-mod encoding;
-mod joining;
-mod publishing;
-mod requests;
-mod subscriptions;
+mod calls;
+mod clients;
+mod goals;
+mod topics;
 
 use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 use std::net::IpAddr;
@@ -21,10 +19,10 @@ use std::sync::atomic::{AtomicU64, AtomicUsize};
 
 use actix::prelude::*;
 use bytes::Bytes;
-use tokio::sync::oneshot;
 use tokio::time::Instant;
 
-pub use self::joining::{Connect, CountRefusal, Disconnect, HeldPlace, Retire};
+use self::calls::Cleanup;
+pub use self::clients::{Connect, CountRefusal, Disconnect, HeldPlace, Retire};
 use crate::actors::ConnectionId;
 use crate::actors::graph::forwarded::ForwardedRequests;
 use crate::actors::graph::providers::Providers;
@@ -32,7 +30,7 @@ use crate::actors::graph::registrations::{EntrySum, Registrations};
 use crate::actors::graph::subscribers;
 use crate::actors::graph::topics::Topics;
 pub use crate::actors::node::{Attach, FinishAll, Nodes, RefuseCalls, SetTap, Tapped};
-use crate::actors::node::{ClientLink, Done, Tap};
+use crate::actors::node::{ClientLink, Completion, Tap, Working};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::gone::Gone;
 use crate::actors::resources::memory::{Permit, Pool};
@@ -95,9 +93,9 @@ struct Client {
     error_form: ErrorForm,
     /// Replaced when the client unsubscribes from the feedback of its goals, and dropped with the client.
     listening: Arc<()>,
-    /// The guard that its calls to other clients share, and the receiver that ends with them. Removed when the client
+    /// What its calls to other clients hold, and the completion of all of them. Removed when the client
     /// stops sending.
-    calls: Option<(Done, oneshot::Receiver<()>)>,
+    calls: Option<(Working, Completion)>,
 }
 
 /// The sender of the frame that is being performed, and the frame's `id`.
@@ -130,33 +128,33 @@ impl Actor for Registry {
     type Context = Context<Self>;
 
     fn started(&mut self, ctx: &mut Context<Self>) {
-        Self::start_cleanup(ctx);
+        ctx.spawn(Cleanup::default());
     }
 }
 
 impl Handler<Request> for Registry {
-    type Result = Handled;
+    type Result = Completion;
 
-    fn handle(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
+    fn handle(&mut self, request: Request, ctx: &mut Context<Self>) -> Completion {
         let Request { from, incoming, .. } = request;
         if !self.clients.contains_key(&from) {
-            return Handled::at_once();
+            return Completion::at_once();
         }
         let Incoming { id, op } = incoming;
         let origin = FrameOrigin { from, id };
         self.permit = request.permit;
-        let handled = match op {
+        let completion = match op {
             Ok(op) => self.perform(origin, op, ctx),
             Err(why) => {
                 self.answer_error(&origin, &why);
-                Handled::at_once()
+                Completion::at_once()
             }
         };
         let permit = self.permit.take();
-        if let Some(permit) = permit.filter(|_| handled.0.is_none()) {
+        if let Some(permit) = permit.filter(|_| completion.is_at_once()) {
             permit.trim();
         }
-        handled
+        completion
     }
 }
 
@@ -164,7 +162,7 @@ impl Handler<Request> for Registry {
 
 impl Registry {
     /// Performs one op of a registered client.
-    fn perform(&mut self, origin: FrameOrigin, op: Op, ctx: &mut Context<Self>) -> Handled {
+    fn perform(&mut self, origin: FrameOrigin, op: Op, ctx: &mut Context<Self>) -> Completion {
         let refusal = match op {
             Op::Publish { topic, msg } => return self.publish(origin, &topic, msg, ctx),
             Op::PublishLines(lines) => return self.publish_lines(origin.from, &lines, ctx),
@@ -203,7 +201,7 @@ impl Registry {
         if let Err(why) = refusal {
             self.refuse(&origin, &why);
         }
-        Handled::at_once()
+        Completion::at_once()
     }
 }
 
@@ -220,9 +218,9 @@ pub struct Outlets {
     pub gone: Gone,
 }
 
-/// One frame of a client. From its connection, which waits for [`Handled`] before it continues to read.
+/// One frame of a client. From its connection, which waits for [`Completion`] before it continues to read.
 #[derive(Message)]
-#[rtype(result = "Handled")]
+#[rtype(result = "Completion")]
 pub struct Request {
     /// The client.
     pub from: ConnectionId,
@@ -230,33 +228,6 @@ pub struct Request {
     pub incoming: Incoming,
     /// The memory permit of a long frame. All forms made of the frame share it.
     pub permit: Option<Permit>,
-}
-
-/// The op has been routed. A node, or the encoding of a long message, may still be at work on it. The receiver ends
-/// after that.
-#[derive(MessageResponse, Default)]
-pub struct Handled(Option<oneshot::Receiver<()>>);
-
-impl Handled {
-    /// The op has already taken effect.
-    #[must_use]
-    pub fn at_once() -> Self {
-        Self::default()
-    }
-
-    /// A node has the op, or its long message is being encoded.
-    #[must_use]
-    pub fn with(effect: oneshot::Receiver<()>) -> Self {
-        Self(Some(effect))
-    }
-
-    /// Waits until the op has taken effect.
-    pub async fn effect(self) {
-        if let Some(effect) = self.0 {
-            // The sender never sends: dropping it is the signal.
-            let _ = effect.await;
-        }
-    }
 }
 
 /// The registry's messages to a connection, in one order.

@@ -39,8 +39,12 @@ impl<const N: usize> TfRepublisher<N> {
                 id: message.id,
                 wants_feedback: false,
             };
-            let (goal, done) = (FrameGoal { published, ..goal }, message.done);
-            ForwardGoal { goal, client, done }
+            let (goal, working) = (FrameGoal { published, ..goal }, message.working);
+            ForwardGoal {
+                goal,
+                client,
+                working,
+            }
         };
         nodes.subscribe(Topic::TfWebGoal, address.clone(), read_goal::<N>, start);
         let cancel = |id, _| CancelPublished(id);

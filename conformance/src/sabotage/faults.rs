@@ -17,11 +17,19 @@
 //! and `every 3` count the frames. Changes are separated by `; `: `path = json`, `path is json -> json`, `path + number`, `path * number`
 //! (`2 n` is two for each frame so far), `- path`, `pop path`, `keep 1`. `[*1.0]` has that entry for each joint, `last` is the last one.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    reason = "the table is a part of the program, and the self-test makes each fault"
+)]
+
 use serde_json::{Value, json};
 
-use crate::proxy::{Fault, Side};
+use super::proxy::{Fault, Side};
 
 /// A fault that a rule must find.
+#[derive(Debug, Clone, Copy)]
 pub struct Planted {
     /// The rule.
     pub rule: &'static str,
@@ -31,6 +39,7 @@ pub struct Planted {
 }
 
 /// At least one for each rule.
+#[must_use]
 pub fn all() -> Vec<Planted> {
     let row = |line: &'static str| {
         let [rule, says, made] = line.split(" | ").collect::<Vec<_>>().try_into().expect(line);
@@ -41,6 +50,7 @@ pub fn all() -> Vec<Planted> {
 
 impl Planted {
     /// Makes it, for a number of links.
+    #[must_use]
     pub fn fault(&self, links: usize) -> Fault {
         let mut parts: Vec<Fault> = self.made.split(" & ").map(|part| one(part, links)).collect();
         Box::new(move |side, frame| {
@@ -177,7 +187,7 @@ fn number(text: &str, count: usize) -> f64 {
         None => (text, "0"),
     };
     let parse = |text: &str| text.parse::<f64>().expect(text);
-    parse(base) + parse(each) * f64::from(u32::try_from(count).unwrap())
+    parse(base) + parse(each) * f64::from(u32::try_from(count).unwrap_or(u32::MAX))
 }
 
 fn apply(subject: &mut Value, change: &str, count: usize, links: usize) {
