@@ -21,12 +21,14 @@ fn analysis(given: Given) -> Analysis {
     at_once(analyse(given, control()))
 }
 
+type Published = (&'static str, u32, Option<u32>, Option<f64>, Option<f64>);
+
 /// Order, order of the embedded method, and the ends of stability on both axes.
 ///
 /// Hairer and Wanner, *Solving Ordinary Differential Equations II*, ch. IV.2, has those of Taylor's polynomials:
 /// 2, 2, 2.5127, 2.7853 and 0, 0, √3, √8. Dormand and Prince's method ends its polynomial with `z⁶/600`, so the end `y` on the
 /// imaginary axis solves `9 y² - 8 - y⁴ + y⁶/25 = 0`. Semi-implicit Euler and Verlet are stable up to `ω h = 2`.
-const PUBLISHED: [(&str, u32, Option<u32>, Option<f64>, Option<f64>); 17] = [
+const PUBLISHED: [Published; 17] = [
     ("euler", 1, None, Some(2.0), Some(0.0)),
     ("midpoint", 2, None, Some(2.0), Some(0.0)),
     ("heun2", 2, None, Some(2.0), Some(0.0)),
