@@ -114,7 +114,7 @@ fn plan<const N: usize>(options: &PlanOptions, gains: Gains<N>) -> Result<String
     };
     control.period = ControlPeriod {
         period: options.control_period.unwrap_or_default(),
-        delay: options.delay,
+        delay: u8::from(options.delay),
     };
     let task = Task {
         control,

@@ -5,7 +5,7 @@
 //! **Invariant:** the tested server gets its settings back, also after a signal.
 
 use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -13,6 +13,7 @@ use std::time::Duration;
 use clap::Args;
 use pendularm_conformance::Selection;
 use pendularm_conformance::command::{Files, Order, conduct, list};
+use pendularm_conformance::points::Points;
 
 use crate::output::{self, print_error};
 use crate::signals;
@@ -66,6 +67,9 @@ pub struct ConformanceOptions {
     /// File for the results as one page
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// File with the points of rules, sections or categories, such as `method-4 = 5`
+    #[arg(long, value_name = "FILE")]
+    points: Option<PathBuf>,
     /// Command of the shell that starts the server; it is stopped afterwards, and its start and end are tested too
     #[arg(long, value_name = "COMMAND")]
     start: Option<String>,
@@ -81,6 +85,13 @@ fn read_timeout(text: &str) -> Result<Duration, String> {
         "a time in seconds from 0.1 to 60",
         text,
     )
+}
+
+/// Reads a file of points.
+fn read_points(path: &Path) -> Result<Points, String> {
+    let text = std::fs::read_to_string(path).map_err(|error| error.to_string());
+    let points = text.and_then(|text| Points::read(&text));
+    points.map_err(|why| format!("{}: {why}", path.display()))
 }
 
 /// Tries the rules, prints the results, and returns the exit status.
@@ -106,6 +117,14 @@ pub fn run(options: &ConformanceOptions) -> u8 {
         }
         return 0;
     }
+    let points = options.points.as_deref().map(read_points).transpose();
+    let points = match points {
+        Ok(points) => points,
+        Err(why) => {
+            print_error(&why);
+            return NOT_TRIED;
+        }
+    };
     if let Err(error) = signals::at_request(move || ending.store(true, Ordering::Relaxed)) {
         print_error(&error);
         return FAILED;
@@ -121,6 +140,7 @@ pub fn run(options: &ConformanceOptions) -> u8 {
         selection,
         start,
         files,
+        points,
     };
     match conduct(&order, &mut say, &mut progress) {
         Ok(results) => u8::from(!results.is_good()) * FAILED,

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::launch::{self, Launch, Started};
+use crate::points::Points;
 use crate::{Results, Row, Rule, Selection, export, report, rules, run};
 
 /// An order for a run.
@@ -16,6 +17,8 @@ pub struct Order {
     pub start: Option<String>,
     /// Files for the results.
     pub files: Files,
+    /// What the rules are worth, if that is given.
+    pub points: Option<Points>,
 }
 
 /// Files for the results.
@@ -67,6 +70,7 @@ pub fn conduct(order: &Order, say: &mut dyn FnMut(&str), progress: &mut dyn FnMu
             results.rows.push(row);
         }
     }
+    results.points.clone_from(&order.points);
     say(&report::summary(&results));
     order.files.write(&results)?;
     Ok(results)

@@ -36,7 +36,10 @@ pub fn json(results: &Results) -> Value {
     };
     let total = |category: &str| {
         let (holding, all) = report::count(results, category);
-        json!({"holding": holding, "all": all})
+        match results.points.as_ref().map(|points| points.earned(results, category)) {
+            None => json!({"holding": holding, "all": all}),
+            Some([earned, most]) => json!({"holding": holding, "all": all, "points": earned, "most_points": most}),
+        }
     };
     let totals: serde_json::Map<String, Value> = CATEGORIES.iter().map(|name| ((*name).to_owned(), total(name))).collect();
     json!({
@@ -136,7 +139,7 @@ pub fn html(results: &Results) -> String {
     page += "<table><tr><th>Category</th><th>Rules that hold</th></tr>\n";
     for (name, category) in CATEGORIES.into_iter().map(|name| (name, name)).chain([("All", "")]) {
         let (holding, all) = report::count(results, category);
-        let _ = writeln!(page, "<tr><td>{name}</td><td>{holding} of {all}</td></tr>");
+        let _ = writeln!(page, "<tr><td>{name}</td><td>{holding} of {all}{}</td></tr>", report::earned(results, category));
     }
     page += "</table>\n<h2>Mend first</h2>\n";
     let (groups, rest) = report::failures(results);

@@ -14,6 +14,7 @@
 //! | [`mistakes`] | usual mistakes as models, for the cause of a wrong answer |
 //! | [`report`], [`export`] | the results for a reader, and for programs |
 //! | [`command`] | a whole run |
+//! | [`points`] | what each rule is worth in a course |
 //! | [`sabotage`] | servers with a planted fault |
 
 pub mod arm;
@@ -24,6 +25,7 @@ pub mod launch;
 pub mod method;
 pub mod mistakes;
 pub mod peer;
+pub mod points;
 pub mod report;
 pub mod rules;
 pub mod run;
@@ -37,6 +39,7 @@ use std::time::{Duration, Instant};
 
 use bench::{Bench, Found};
 use mistakes::{Diagnosis, Subject};
+use points::Points;
 use run::{Frame, PATIENCE, Run};
 use serde_json::{Value, json};
 
@@ -118,6 +121,12 @@ impl Row {
         self.got.is_ok()
     }
 
+    /// Whether the rule counts for this category; for any if the name is empty.
+    #[must_use]
+    pub fn counts_for(&self, category: &str) -> bool {
+        self.rule.counts() && !self.is_aside && (category.is_empty() || self.rule.category == category)
+    }
+
     /// Whether the rule counts against the server.
     #[must_use]
     pub fn fails(&self) -> bool {
@@ -180,6 +189,8 @@ pub struct Results {
     pub lacking: BTreeSet<String>,
     /// The time of the run.
     pub time: Duration,
+    /// What the rules are worth, if that is given.
+    pub points: Option<Points>,
 }
 
 impl Results {
@@ -252,7 +263,15 @@ pub fn run(address: &str, selection: &Selection, mut tell: impl FnMut(&Row, usiz
         notes.extend(found.restore(address));
     }
     let notes = notes.into_iter().collect();
-    Ok(Results { address: address.to_owned(), links: found.links, rows, notes, lacking: run.lacking(), time: began.elapsed() })
+    Ok(Results {
+        address: address.to_owned(),
+        links: found.links,
+        rows,
+        notes,
+        lacking: run.lacking(),
+        time: began.elapsed(),
+        points: None,
+    })
 }
 
 /// Whether something listens at the address. A server that restarts gets a moment.

@@ -118,8 +118,8 @@ pub fn summary(results: &Results) -> String {
 /// Rules of a category that hold, and rules that count; all for an empty name.
 #[must_use]
 pub fn count(results: &Results, category: &str) -> (usize, usize) {
-    let counts = |row: &&Row| row.rule.counts() && !row.is_aside && (category.is_empty() || row.rule.category == category);
-    results.rows.iter().filter(counts).fold((0, 0), |(holding, all), row| (holding + usize::from(row.holds()), all + 1))
+    let counting = results.rows.iter().filter(|row| row.counts_for(category));
+    counting.fold((0, 0), |(holding, all), row| (holding + usize::from(row.holds()), all + 1))
 }
 
 /// The totals, one line a category.
@@ -128,9 +128,16 @@ pub fn totals(results: &Results) -> String {
     let named = CATEGORIES.into_iter().map(|name| (name, name)).chain([("All", "")]);
     let lines = named.map(|(name, category)| {
         let (holding, all) = count(results, category);
-        format!("{name:<30} {holding:>3} of {all:>3}\n")
+        format!("{name:<30} {holding:>3} of {all:>3}{}\n", earned(results, category))
     });
     lines.collect()
+}
+
+/// The earned points of a category, if points are given.
+#[must_use]
+pub fn earned(results: &Results, category: &str) -> String {
+    let earned = results.points.as_ref().map(|points| points.earned(results, category));
+    earned.map_or_else(String::new, |[earned, all]| format!(", {earned} of {all} points"))
 }
 
 /// A text in lines of at most [`WIDTH`] characters. The first one begins with `head`, the others with as many spaces.

@@ -113,7 +113,7 @@ impl Simulation {
         let timestep = fields::number("timestep", timestep, Bound::Positive)?;
         let period = ControlPeriod {
             period: fields::number("control_period", control_period, Bound::NotNegative)?,
-            delay: control_delay.read("control_delay")?,
+            delay: control_delay.read("control_delay")?.into(),
         };
         let own = match or_default(arm)? {
             Chain::Two(arm) => Either::Two(begin(arm, method, timestep, period, gains)?),
@@ -384,12 +384,12 @@ impl Simulation {
     /// Whether the controller's effort is applied one control period after its state was read.
     #[getter]
     fn control_delay(&self, py: Python<'_>) -> bool {
-        for_either!(&self.own, one => hold(py, one).control_period()).delay
+        for_either!(&self.own, one => hold(py, one).control_period()).delay > 0
     }
 
     #[setter]
     fn set_control_delay(&self, py: Python<'_>, control_delay: Flag) -> PyResult<()> {
-        let delay = control_delay.read("control_delay")?;
+        let delay = control_delay.read("control_delay")?.into();
         for_either!(&self.own, one => {
             let mut one = hold(py, one);
             let present = one.control_period();

@@ -6,7 +6,8 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::limits::Limits;
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::{Checkpoint, ControlPeriod, Held, Simulation};
+use pendularm::math::sensors::Sensors;
+use pendularm::math::simulation::{Checkpoint, ControlPeriod, Held, Memory, Simulation};
 use pyo3::prelude::{PyErr, PyResult, Python};
 use pyo3::types::{PyBytes, PyBytesMethods};
 
@@ -161,7 +162,7 @@ impl Reader<'_> {
 
     fn checkpoint<const N: usize>(mut self) -> Option<Simulation<N>> {
         let enabled = self.flag()?;
-        let delay = self.flag()?;
+        let delay = self.flag()?.into();
         let due = self.whole()?;
         let is_driven = self.flag()?;
         let method = *Method::ALL.get(usize::try_from(self.whole()?).ok()?)?;
@@ -206,8 +207,10 @@ impl Reader<'_> {
             integral,
             enabled,
             held,
-            // The library sets neither limits nor friction.
+            // The library sets no limits, friction or sensors.
             limits: Limits::default(),
+            sensors: Sensors::default(),
+            memory: Memory::default(),
             method,
             timestep,
             state: State {

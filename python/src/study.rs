@@ -107,7 +107,7 @@ fn listed_limits<'py, const N: usize>(
 fn read_period(period: Real) -> PyResult<ControlPeriod> {
     Ok(ControlPeriod {
         period: fields::number("control_period", period, Bound::NotNegative)?,
-        delay: false,
+        delay: 0,
     })
 }
 

@@ -118,7 +118,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
 
     /// Changes the control period \[s\], not negative, before any other call.
     pub fn set_period(&mut self, period: f64) {
-        let delay = false;
+        let delay = 0;
         self.simulation
             .set_control_period(ControlPeriod { period, delay });
     }

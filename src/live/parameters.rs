@@ -39,9 +39,9 @@ impl<const N: usize> ArmRequest<N> for AskParameters<N> {
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
     fn value_of(&self, parameter: Parameter) -> ParameterValue<N> {
-        use ParameterValue::{Number, PerJoint, Text, Unset};
+        use ParameterValue::{Number, PerJoint, Text, Unset, Whole};
         let (arm, gains) = (self.simulation.arm(), self.simulation.pid().gains());
-        let limits = self.simulation.limits();
+        let (limits, sensors) = (self.simulation.limits(), self.simulation.sensors());
         match parameter {
             Parameter::Gravity => Number(arm.gravity()),
             Parameter::Masses => PerJoint(*arm.masses()),
@@ -56,6 +56,9 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             Parameter::EffortLimit => limits.effort.map_or(Unset, PerJoint),
             Parameter::AntiWindup => Text(limits.anti_windup.name().to_owned()),
             Parameter::TrackingTime => Number(limits.tracking_time),
+            Parameter::EncoderStep => PerJoint(sensors.encoder_step),
+            Parameter::MeasuredVelocity => Text(sensors.velocity.name().to_owned()),
+            Parameter::ControlDelay => Whole(self.simulation.control_period().delay),
             Parameter::RobotDescription => {
                 let (lengths, masses) = (arm.lengths(), arm.masses());
                 Text(urdf::describe(&joint_names::<N>(), lengths, masses))
@@ -72,6 +75,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             ParameterChange::Integrator(ask) => ask.perform(self).rejected,
             ParameterChange::Period(ask) => ask.perform(self).rejected,
             ParameterChange::Limits(ask) => ask.perform(self).rejected,
+            ParameterChange::Sensors(ask) => ask.perform(self).rejected,
         }
     }
 }

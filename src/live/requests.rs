@@ -12,8 +12,9 @@ use crate::math::simulation::{ArmInput, ControlPeriod};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::Rejections;
 use crate::services::arm::{
-    DIVERGED, Disturb, Enable, GetTime, Integrator, Pause, PeriodInForce, Push, Reset, SetFriction,
-    SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod, SetState,
+    DIVERGED, Disturb, Enable, GetTime, Integrator, Pause, PeriodInForce, Push, Reset,
+    SensorsInForce, SetFriction, SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod,
+    SetSensors, SetState,
 };
 use crate::services::goals::Solve;
 use crate::services::{Ask, Echo};
@@ -142,7 +143,7 @@ impl<const N: usize> ArmRequest<N> for SetPeriod {
         let present = arm.simulation.control_period();
         let period = ControlPeriod {
             period: self.period.unwrap_or(present.period),
-            delay: self.delay.unwrap_or(present.delay),
+            delay: self.delay.map_or(present.delay, u8::from),
         };
         if period != present {
             arm.change(ArmInput::Period(period));
@@ -181,6 +182,28 @@ impl<const N: usize> ArmRequest<N> for SetLimits<N> {
         if values != present {
             arm.change(ArmInput::Limits(values));
             arm.loads.restart();
+        }
+        Echo {
+            values,
+            rejected: self.rejected,
+        }
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for SetSensors<N> {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<SensorsInForce<N>> {
+        let period = arm.simulation.control_period();
+        let present = SensorsInForce {
+            sensors: *arm.simulation.sensors(),
+            delay: period.delay,
+        };
+        let values = self.applied_to(&present);
+        if values.sensors != present.sensors {
+            arm.change(ArmInput::Sensors(values.sensors));
+        }
+        if values.delay != present.delay {
+            let delay = values.delay;
+            arm.change(ArmInput::Period(ControlPeriod { delay, ..period }));
         }
         Echo {
             values,

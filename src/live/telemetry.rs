@@ -1,4 +1,4 @@
-//! The arm's topics: `/joint_states` and `/clock` at every tick, `/arm_sim/error_estimate` at every sixth,
+//! The arm's topics: `/joint_states`, `/joint_states_measured` and `/clock` at every tick, `/arm_sim/error_estimate` at every sixth,
 //! `/diagnostics` once a second and at every change.
 //!
 //! **Invariant:** nothing is computed for a topic without subscribers. Messages are encoded elsewhere.
@@ -46,7 +46,10 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         self.counts.ticks += 1;
         let stamp = Stamp::from_seconds(self.simulation.time());
         if self.counts.wants(Topic::JointStates) {
-            self.publish_joint_state(stamp);
+            self.publish_joint_state(Topic::JointStates, stamp, *self.simulation.state());
+        }
+        if self.counts.wants(Topic::MeasuredStates) {
+            self.publish_joint_state(Topic::MeasuredStates, stamp, self.simulation.measured());
         }
         if self.counts.wants(Topic::Clock) {
             self.publish(Topic::Clock, move || Clock { clock: stamp });
@@ -92,10 +95,9 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             .publish(topic, move || messages::publish(topic.name(), &make()));
     }
 
-    fn publish_joint_state(&self, stamp: Stamp) {
-        let State { position, velocity } = *self.simulation.state();
+    fn publish_joint_state(&self, topic: Topic, stamp: Stamp, state: State<N>) {
+        let State { position, velocity } = state;
         let (name, effort) = (joint_names::<N>(), *self.simulation.effort());
-        let topic = Topic::JointStates;
         self.world.publish(topic, move || {
             let message = JointState {
                 header: header(stamp),

@@ -17,6 +17,7 @@ pub mod number;
 pub mod pacer;
 pub mod particle;
 pub mod pid;
+pub mod sensors;
 pub(crate) mod shown;
 pub mod simulation;
 pub mod trajectory;

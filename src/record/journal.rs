@@ -8,7 +8,8 @@ use crate::math::arm::{Arm, ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::limits::{AntiWindup, Limits};
 use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::{ArmInput, Checkpoint, ControlPeriod, Held, StepNote};
+use crate::math::sensors::{MAX_DELAY, Sensors, VelocitySource};
+use crate::math::simulation::{ArmInput, Checkpoint, ControlPeriod, Held, Memory, StepNote};
 use crate::protocol::wire::text::{excerpt, shortened};
 
 use super::writer::VERSION;
@@ -60,6 +61,7 @@ pub fn write_note<const N: usize>(note: &StepNote<N>) -> String {
             ArmInput::Disturbance { effort, duration } => ("disturb", (*effort, *duration).write()),
             ArmInput::Period(period) => ("period", period.write()),
             ArmInput::Limits(limits) => ("limits", limits.write()),
+            ArmInput::Sensors(sensors) => ("sensors", sensors.write()),
             ArmInput::State(state) => ("state", state.write()),
             ArmInput::Command(effort) => ("command", effort.write()),
             ArmInput::Drive(effort) => ("drive", effort.write()),
@@ -111,6 +113,7 @@ pub fn read_note<const N: usize>(note: &str) -> Result<StepNote<N>, NoteError> {
         }
         "period" => ArmInput::Period(Noted::read("period", value)?),
         "limits" => ArmInput::Limits(Noted::read("limits", value)?),
+        "sensors" => ArmInput::Sensors(Noted::read("sensors", value)?),
         "state" => ArmInput::State(Noted::read("state", value)?),
         "command" => ArmInput::Command(Noted::read("command", value)?),
         "drive" => ArmInput::Drive(Noted::read("drive", value)?),
@@ -151,7 +154,7 @@ macro_rules! noted {
 
 noted! {
     [const N: usize] Checkpoint<N> {
-        arm, gains, setpoint, integral, enabled, held, limits, method, timestep, state, carry, effort, disturbance, base,
+        arm, gains, setpoint, integral, enabled, held, limits, sensors, memory, method, timestep, state, carry, effort, disturbance, base,
         steps_since_base, steps, divergence
     }
     [const N: usize] Held<N> { period, due, effort, computed, command, driven }
@@ -160,6 +163,7 @@ noted! {
     [const N: usize] State<N> { position, velocity }
 }
 
+/// Records of older versions have a delay of `false` or `true`.
 impl Noted for ControlPeriod {
     fn write(&self) -> Value {
         json!({"period": self.period, "delay": self.delay})
@@ -167,7 +171,11 @@ impl Noted for ControlPeriod {
 
     fn read(name: &'static str, from: &Value) -> Result<Self, NoteError> {
         let period = Noted::read("period", &from["period"])?;
-        let delay = Noted::read("delay", &from["delay"])?;
+        let given = &from["delay"];
+        let delay = given.as_bool().map(u64::from).or(given.as_u64());
+        let delay = delay.and_then(|delay| u8::try_from(delay).ok());
+        let delay = delay.filter(|delay| *delay <= MAX_DELAY);
+        let delay = delay.ok_or(NoteError::Field("delay", "be a whole number from 0 to 16"))?;
         let read = Some(Self { period, delay }).filter(|one| one.period >= 0.0);
         read.ok_or(NoteError::Field(name, "not be negative"))
     }
@@ -199,6 +207,52 @@ impl<const N: usize> Noted for Limits<N> {
                 .ok_or(NoteError::Field("anti_windup", "be the name of a form"))?,
             tracking_time,
         })
+    }
+}
+
+/// Records of versions without sensors have none.
+impl<const N: usize> Noted for Sensors<N> {
+    fn write(&self) -> Value {
+        json!({"encoder_step": self.encoder_step.write(), "velocity": self.velocity.name()})
+    }
+
+    fn read(_: &'static str, from: &Value) -> Result<Self, NoteError> {
+        if from.is_null() {
+            return Ok(Self::default());
+        }
+        let encoder_step: [f64; N] = Noted::read("encoder_step", &from["encoder_step"])?;
+        if encoder_step.iter().any(|step| *step < 0.0) {
+            return Err(NoteError::Field("encoder_step", "not be negative"));
+        }
+        let mut sources = VelocitySource::ALL.into_iter();
+        let velocity = sources.find(|source| from["velocity"] == source.name());
+        Ok(Self {
+            encoder_step,
+            velocity: velocity.ok_or(NoteError::Field("velocity", "be exact or difference"))?,
+        })
+    }
+}
+
+/// Without a measurement and waiting efforts it is null, as in records of older versions.
+impl<const N: usize> Noted for Memory<N> {
+    fn write(&self) -> Value {
+        if *self == Self::default() {
+            return Value::Null;
+        }
+        let waiting: Vec<Value> = self.waiting.iter().map(Noted::write).collect();
+        json!({"measured": self.measured.write(), "waiting": waiting})
+    }
+
+    fn read(_: &'static str, from: &Value) -> Result<Self, NoteError> {
+        let mut read = Self::default();
+        if !from.is_null() {
+            read.measured = Noted::read("measured", &from["measured"])?;
+            let mut waiting = from["waiting"].as_array().into_iter().flatten();
+            for place in &mut read.waiting {
+                *place = Noted::read("waiting", waiting.next().unwrap_or(&Value::Null))?;
+            }
+        }
+        Ok(read)
     }
 }
 

@@ -112,7 +112,13 @@ impl LiveScene {
             .with_timestep(number(&self.watch["timestep"], timestep))
             .with_period(ControlPeriod {
                 period: number(&period["period"], 0.0),
-                delay: period["delay"] == true,
+                delay: match &period["delay"] {
+                    Value::Number(delay) => delay
+                        .as_u64()
+                        .and_then(|it| it.try_into().ok())
+                        .unwrap_or(0),
+                    delay => u8::from(*delay == true),
+                },
             }))
     }
 
@@ -165,7 +171,7 @@ fn fragment<const N: usize>(control: &ControlLoop<N>, start: &State<N>) -> Strin
         list(arm.masses()),
         list(arm.lengths()),
         period.period,
-        on_off(period.delay),
+        on_off(period.delay > 0),
         on_off(!control.is_free()),
         list(&start.position),
         list(&start.velocity),

@@ -37,7 +37,7 @@ fn timestep_limit<const N: usize>(
     linear: &Linear,
     period_limit: Option<f64>,
 ) -> Option<f64> {
-    let (method, delayed) = (control.method, control.period.delay);
+    let (method, delay) = (control.method, control.period.delay);
     let every_step = limit_held(control);
     let period = control.given_period();
     // Up to this limit the law may run in every step. A longer timestep then makes the control period longer.
@@ -48,6 +48,6 @@ fn timestep_limit<const N: usize>(
         return Some(0.0);
     }
     let stable = (2..=MOST_STEPS)
-        .find(|steps| Stepping::held(linear, method, *steps, delayed).is_stable(period));
+        .find(|steps| Stepping::held(linear, method, *steps, delay).is_stable(period));
     Some(stable.map_or(0.0, |steps| period / f64::from(steps)))
 }

@@ -40,14 +40,25 @@ impl<const N: usize> ContinuousLoop<N> {
         }
     }
 
-    fn acceleration(&self, q: &[f64; N], v: &[f64; N], integral: &[f64; N]) -> [f64; N] {
+    /// Whether the law demands an effort that reaches a limit of the motors. The loop itself has no limits.
+    pub fn is_at_limit(&self) -> bool {
+        let State { position, velocity } = &self.state;
+        let effort = self.effort(position, velocity, &self.integral);
+        self.control.limits.reached(&effort).contains(&true)
+    }
+
+    fn effort(&self, q: &[f64; N], v: &[f64; N], integral: &[f64; N]) -> [f64; N] {
         let Gains { kp, ki, kd } = &self.control.gains;
         let Setpoint { position, velocity } = &self.control.setpoint;
-        let effort = std::array::from_fn(|i| {
+        std::array::from_fn(|i| {
             kp[i] * (position[i] - q[i])
                 + ki[i] * integral[i].clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT)
                 + kd[i] * (velocity[i] - v[i])
-        });
+        })
+    }
+
+    fn acceleration(&self, q: &[f64; N], v: &[f64; N], integral: &[f64; N]) -> [f64; N] {
+        let effort = self.effort(q, v, integral);
         let arm = &self.control.arm;
         let effort = if arm.has_friction() {
             less_friction(arm.viscous(), v, &effort)

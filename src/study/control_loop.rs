@@ -9,6 +9,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::math::limits::Limits;
 use crate::math::pid::{Gains, Setpoint};
+use crate::math::sensors::Sensors;
 use crate::math::simulation::{ControlPeriod, DEFAULT_TIMESTEP, Simulation};
 
 /// An arm with its control law, method, timestep and control period.
@@ -29,6 +30,8 @@ pub struct ControlLoop<const N: usize> {
     /// The limits of the motors, and the anti-windup. Predictions near an equilibrium hold while no effort is at its
     /// limit.
     pub limits: Limits<N>,
+    /// What the controller measures. Predictions are without the steps of encoders.
+    pub sensors: Sensors<N>,
 }
 
 impl<const N: usize> ControlLoop<N> {
@@ -42,6 +45,7 @@ impl<const N: usize> ControlLoop<N> {
             timestep: DEFAULT_TIMESTEP,
             period: ControlPeriod::default(),
             limits: Limits::default(),
+            sensors: Sensors::default(),
         }
     }
 
@@ -70,6 +74,7 @@ impl<const N: usize> ControlLoop<N> {
             timestep: simulation.timestep(),
             period: simulation.control_period(),
             limits: *simulation.limits(),
+            sensors: *simulation.sensors(),
         }
     }
 
@@ -124,6 +129,7 @@ impl<const N: usize> ControlLoop<N> {
         simulation.set_timestep(self.timestep);
         simulation.set_control_period(self.period);
         simulation.set_limits(self.limits);
+        simulation.set_sensors(self.sensors);
         simulation.set_state(start);
         simulation.set_setpoint(self.setpoint);
         simulation.enable(!self.is_free());

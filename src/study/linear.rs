@@ -22,6 +22,7 @@ pub(crate) use super::equilibrium::gravity_gradient;
 pub use super::equilibrium::{Equilibrium, equilibrium};
 use super::matrix::Matrix;
 use crate::math::dynamics::forward_dynamics;
+use crate::math::sensors::VelocitySource;
 
 /// The arm and its control law, linear in the deviation from a pose.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +39,8 @@ pub struct Linear {
     pub kd: Vec<f64>,
     /// Integral gains \[N m/(rad s)\] with their joints, of those that integrate.
     pub integrals: Vec<(usize, f64)>,
+    /// Whether the velocities of the law are differences of positions over one control period.
+    pub differences: bool,
 }
 
 impl Linear {
@@ -71,6 +74,7 @@ impl Linear {
                 .filter(|&i| integrating[i])
                 .map(|i| (i, gains.ki[i]))
                 .collect(),
+            differences: control.sensors.velocity == VelocitySource::Difference,
         }
     }
 
@@ -94,7 +98,13 @@ impl Linear {
             kp: vec![kp],
             kd: vec![kd],
             integrals: if ki > 0.0 { vec![(0, ki)] } else { vec![] },
+            differences: false,
         }
+    }
+
+    /// Whether the law of a loop acts on older values than the state at the start of its period.
+    pub fn is_late<const N: usize>(control: &ControlLoop<N>) -> bool {
+        control.period.delay > 0 || control.sensors.velocity == VelocitySource::Difference
     }
 
     /// The loop without gravity.
@@ -142,23 +152,64 @@ impl Linear {
         closed
     }
 
-    /// The same if an effort acts one period late. The states are positions, velocities, efforts and active integrals.
-    pub(super) fn closed_late(&self, arm: &Matrix, period: f64) -> Matrix {
+    /// The same if an effort acts `delay` periods late, or if velocities are differences. The states are positions,
+    /// velocities, efforts on their way with the next one first, active integrals and, for differences, the positions of a
+    /// period before.
+    pub(super) fn closed_late(&self, arm: &Matrix, period: f64, delay: u8) -> Matrix {
         let n = self.joints();
-        let mut closed = Matrix::zeros(3 * n + self.integrals.len());
-        for (row, column) in (0..2 * n).flat_map(|row| (0..3 * n).map(move |column| (row, column)))
-        {
-            closed[(row, column)] = arm[(row, column)];
-        }
+        let integrals = (2 + usize::from(delay)) * n;
+        let before = integrals + self.integrals.len();
+        let size = before + if self.differences { n } else { 0 };
+        // The effort of joint j divided by the period, by the states.
+        let mut law = Matrix::zeros(size);
         for j in 0..n {
-            closed[(2 * n + j, j)] = -self.kp[j] / period;
-            closed[(2 * n + j, n + j)] = -self.kd[j] / period;
-            closed[(2 * n + j, 2 * n + j)] = -1.0 / period;
+            law[(j, j)] = -self.kp[j] / period;
+            let damping = -self.kd[j] / period;
+            if self.differences {
+                law[(j, j)] += damping / period;
+                law[(j, before + j)] = -damping / period;
+            } else {
+                law[(j, n + j)] = damping;
+            }
         }
         for (k, &(joint, ki)) in self.integrals.iter().enumerate() {
-            closed[(2 * n + joint, joint)] -= ki;
-            closed[(2 * n + joint, 3 * n + k)] = ki / period;
-            closed[(3 * n + k, joint)] = -1.0;
+            law[(joint, joint)] -= ki;
+            law[(joint, integrals + k)] = ki / period;
+        }
+        let mut closed = Matrix::zeros(size);
+        for row in 0..2 * n {
+            for column in 0..2 * n {
+                closed[(row, column)] = arm[(row, column)];
+            }
+            for j in 0..n {
+                let effect = arm[(row, 2 * n + j)];
+                if delay > 0 {
+                    closed[(row, 2 * n + j)] = effect;
+                } else {
+                    for column in 0..size {
+                        closed[(row, column)] += effect * period * law[(j, column)];
+                    }
+                }
+            }
+        }
+        for row in 2 * n..integrals {
+            closed[(row, row)] = -1.0 / period;
+            if row + n < integrals {
+                closed[(row, row + n)] = 1.0 / period;
+            } else {
+                for column in 0..size {
+                    closed[(row, column)] += law[(row + n - integrals, column)];
+                }
+            }
+        }
+        for (k, &(joint, _)) in self.integrals.iter().enumerate() {
+            closed[(integrals + k, joint)] = -1.0;
+        }
+        if self.differences {
+            for j in 0..n {
+                closed[(before + j, j)] = 1.0 / period;
+                closed[(before + j, before + j)] = -1.0 / period;
+            }
         }
         closed
     }

@@ -42,6 +42,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use libm::sincos;
 
 use super::control_loop::ControlLoop;
+use super::linear::Linear;
 use super::paused::pause;
 use super::stability::bisect;
 use crate::math::arm::Arm;
@@ -137,7 +138,7 @@ impl<const N: usize> Proof<N> {
         let ControlLoop {
             arm, gains, method, ..
         } = control;
-        if control.period.delay || arm.has_friction() {
+        if Linear::is_late(control) || arm.has_friction() {
             return None;
         }
         let mut proof = Self {

@@ -24,7 +24,7 @@ use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
 use crate::math::pid::Pid;
 use crate::math::shown::{Shown, shown_against};
-use crate::math::simulation::{Divergence, Held, Hold, Simulation};
+use crate::math::simulation::{Divergence, Held, Hold, Memory, Simulation};
 
 /// Most steps of one run: a few seconds of one core, or up to two minutes with a reference under control.
 pub const MAX_STEPS: u64 = 10_000_000;
@@ -163,8 +163,8 @@ pub struct Rollout<const N: usize> {
     pub evaluations: u64,
     /// Errors against the reference, if one was requested.
     pub deviation: Option<Deviation>,
-    /// Errors of the method and of the held effort, against the loop with a continuous-time law. `None` without a
-    /// control law, or if no reference was requested.
+    /// Errors of the method and of the held effort, against the loop with a continuous-time law, up to the first effort at
+    /// a limit of the motors. `None` without a control law, or if no reference was requested.
     pub from_ideal: Option<Deviation>,
     /// The step that diverged, if one did.
     pub divergence: Option<Divergence>,
@@ -217,7 +217,9 @@ pub async fn rollout<const N: usize>(
             for reference in references.as_deref_mut().into_iter().flatten() {
                 reference.follow(taken, &mut piece).await;
             }
+            let is_limited = run.at_limit().contains(&true);
             for ideal in ideals.iter_mut().flatten() {
+                ideal.run.take_if(|_| is_limited);
                 ideal.follow(taken, &mut piece).await;
             }
         }
@@ -285,7 +287,7 @@ const MAX_IDEAL_STEPS: u64 = 4 * MAX_STEPS;
 
 /// The loop with a continuous-time law. Its timestep divides that of the run.
 struct Ideal<const N: usize> {
-    /// `None` once it has diverged.
+    /// `None` once it has diverged, or an effort is at its limit: this loop has no limits.
     run: Option<ContinuousLoop<N>>,
     parts: u64,
 }
@@ -307,7 +309,7 @@ impl<const N: usize> Ideal<N> {
     async fn follow(&mut self, steps: u64, piece: &mut PieceWork) {
         for _ in 0..steps * self.parts {
             self.run
-                .take_if(|run| run.steps >= MAX_IDEAL_STEPS || !run.step());
+                .take_if(|run| run.steps >= MAX_IDEAL_STEPS || run.is_at_limit() || !run.step());
             if self.run.is_none() {
                 return;
             }
@@ -341,7 +343,12 @@ impl<const N: usize> Reference<N> {
             arm: neighbour(&control.arm, index),
             taylor: TaylorReference::new(start).cut(if index == 1 { 2 } else { 1 }),
             pid: control.simulation(start).pid().clone(),
-            hold: Hold::new(held, control.limits, control.timestep),
+            hold: Hold::new(
+                held,
+                control.limits,
+                (control.sensors, Memory::default()),
+                control.timestep,
+            ),
             timestep: control.timestep,
             spans: 0,
             is_lost: false,

@@ -146,8 +146,8 @@ pub struct Stepping<'a> {
     sampling: Sampling,
     /// Steps of the method in one control period.
     substeps: u32,
-    /// Whether a held effort acts one period late.
-    delayed: bool,
+    /// The number of periods after which a held effort acts.
+    delay: u8,
     /// The matrix of the stepped system: the loop, or the arm with constant efforts.
     stepped: Matrix,
 }
@@ -159,7 +159,7 @@ impl<'a> Stepping<'a> {
             method,
             sampling,
             substeps: 1,
-            delayed: false,
+            delay: 0,
             stepped: match sampling {
                 Sampling::Continuous => linear.flow(),
                 Sampling::Held => linear.plant(),
@@ -167,12 +167,12 @@ impl<'a> Stepping<'a> {
         }
     }
 
-    /// The law once in a control period of `substeps` steps; its effort acts at once, or one period late, as with a bus
-    /// or a slow controller.
-    pub fn held(linear: &'a Linear, method: Method, substeps: u32, delayed: bool) -> Self {
+    /// The law once in a control period of `substeps` steps; its effort acts `delay` periods late, as with a bus or a
+    /// slow controller.
+    pub fn held(linear: &'a Linear, method: Method, substeps: u32, delay: u8) -> Self {
         Self {
             substeps: substeps.max(1),
-            delayed,
+            delay,
             ..Self::new(linear, method, Sampling::Held)
         }
     }
@@ -184,7 +184,7 @@ impl<'a> Stepping<'a> {
         sampling: Sampling,
     ) -> Self {
         Self {
-            delayed: control.period.delay,
+            delay: control.period.delay,
             ..Self::new(linear, control.method, sampling)
         }
     }
@@ -209,9 +209,9 @@ impl<'a> Stepping<'a> {
         };
         match self.sampling {
             Sampling::Continuous => free,
-            Sampling::Held if self.delayed => {
+            Sampling::Held if self.delay > 0 || self.linear.differences => {
                 let arm = repeated(&free, h, self.substeps);
-                self.linear.closed_late(&arm, period)
+                self.linear.closed_late(&arm, period, self.delay)
             }
             Sampling::Held => {
                 let arm = repeated(&free, h, self.substeps);

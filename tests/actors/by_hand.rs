@@ -57,7 +57,8 @@ async fn change(client: &mut Client, offline: &mut Simulation<2>, random: &mut f
         }
         2 => {
             let period = [0.0, 0.0013, 0.004, 0.01][random.usize(0..4)];
-            let control = ControlPeriod { period, delay: on };
+            let delay = u8::from(on);
+            let control = ControlPeriod { period, delay };
             offline.set_control_period(control);
             let args = json!({"period": period, "delay": on});
             let answer = client.ask("/pid_controller/set_period", args).await;

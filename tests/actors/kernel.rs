@@ -203,7 +203,7 @@ fn is_of_the_study(links: usize, service: &str, args: &Value) -> bool {
 }
 
 /// The services of the page, and one more; the others need a server.
-const SERVED: [&str; 22] = [
+const SERVED: [&str; 23] = [
     "/arm_sim/set_params",
     "/arm_sim/set_friction",
     "/arm_sim/set_integrator",
@@ -214,6 +214,7 @@ const SERVED: [&str; 22] = [
     "/arm_sim/disturb",
     "/pid_controller/set_gains",
     "/pid_controller/set_limits",
+    "/pid_controller/set_sensors",
     "/pid_controller/set_period",
     "/pid_controller/enable",
     "/ik/solve",

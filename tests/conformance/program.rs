@@ -217,6 +217,34 @@ fn two_runs_at_once_and_other_programs_are_noticed() {
     assert!(out(&output).contains("another program moved the arm"), "{}", out(&output));
 }
 
+#[test]
+fn points_of_rules_sections_and_categories_are_added_up() {
+    let path = file("points.toml");
+    let (program, address) = (Runtime::start(), |program: &Runtime| program.address.to_string());
+    let graded = |text: &str, arguments: &[&str]| {
+        std::fs::write(&path, text).unwrap();
+        conformance(&[&[&address(&program), "--points", &path], arguments].concat())
+    };
+    let text = "# worth\n[points]\nmethod-1 = 5  # this one\nmethod = 2\n\"PID control\" = 0.25\n";
+    let json = file("points.json");
+    let output = graded(text, &["--rule", "method", "--json", &json]);
+    let rules = out(&output).matches("\nok   method-").count() + usize::from(out(&output).starts_with("ok   method-"));
+    let all = 2 * rules + 3;
+    assert!(rules > 3 && out(&output).contains(&format!("{rules}, {all} of {all} points")), "{output:?}");
+    let results: Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    assert_eq!(results["all"]["points"], all as f64);
+    let output = graded(text, &["--rule", "gains-1"]);
+    assert!(out(&output).contains("0.25 of 0.25 points"), "{output:?}");
+    for (text, wrong) in [
+        ("method-1", "line 1: must be `name = points`"),
+        ("\nmethods = 2", "line 2: must name a rule, a section or a category"),
+        ("method = -1", "line 1: points must be a number, at least 0"),
+        ("method = 1\nmethod = 2", "line 2: the name has points already"),
+    ] {
+        assert!(common::complaint(&graded(text, &[]), 2).contains(wrong), "{text}");
+    }
+}
+
 /// The first lines of a saboteur with these arguments at a free port, and the exit status after a request to end.
 #[cfg(unix)]
 fn sabotaged(arguments: &[&str], lines: usize, during: impl FnOnce(&str)) -> (Vec<String>, Option<i32>) {

@@ -9,6 +9,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::limits::{AntiWindup, Limits};
 use pendularm::math::number::Registers;
 use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::sensors::{Sensors, VelocitySource};
 use pendularm::math::simulation::{ControlPeriod, Simulation, batch};
 
 /// Sizes around the point at which the sine's reduction needs the C library (2e5 rad), and far beyond.
@@ -69,7 +70,7 @@ fn any_simulation<const N: usize>(rng: &mut Rng) -> Simulation<N> {
     if rng.bool() {
         simulation.set_control_period(ControlPeriod {
             period: simulation.timestep() * between(rng, 0.0, 12.0),
-            delay: rng.bool(),
+            delay: if rng.bool() { rng.u8(..3) } else { 0 },
         });
     }
     simulation.set_setpoint(Setpoint {
@@ -93,6 +94,18 @@ fn any_simulation<const N: usize>(rng: &mut Rng) -> Simulation<N> {
             effort: rng.bool().then(|| each(|| between(rng, 0.0, 50.0))),
             anti_windup: *rng.choice(AntiWindup::ALL.iter()).unwrap(),
             tracking_time: of_any_size(rng, 1e-4, 10.0),
+        });
+    }
+    if rng.u32(..3) == 0 {
+        simulation.set_sensors(Sensors {
+            encoder_step: each(|| {
+                if rng.bool() {
+                    between(rng, 0.0, 0.01)
+                } else {
+                    0.0
+                }
+            }),
+            velocity: *rng.choice(VelocitySource::ALL.iter()).unwrap(),
         });
     }
     if rng.u32(..3) == 0 {

@@ -14,7 +14,7 @@ fn unstable<const N: usize>(gains: Gains<N>, method: Method) -> Simulation<N> {
     simulation.set_timestep(0.03);
     simulation.set_control_period(ControlPeriod {
         period: 0.06,
-        delay: true,
+        delay: 1,
     });
     simulation.set_setpoint(Setpoint::at([0.5; N]));
     simulation.enable(true);

@@ -209,7 +209,7 @@ fn a_new_limit_bounds_an_effort_that_is_held_already() {
 fn with_a_delay_the_limited_effort_is_applied_a_period_later() {
     let mut arm = limited(AntiWindup::BackCalculation, 10);
     let delay = ControlPeriod {
-        delay: true,
+        delay: 1,
         ..arm.control_period()
     };
     arm.set_control_period(delay);

@@ -27,6 +27,7 @@ mod kinematics;
 mod limits;
 mod pacer;
 mod particle;
+mod sensors;
 mod simulation;
 #[path = "../support/stored.rs"]
 mod stored;

@@ -22,12 +22,14 @@ fn the_fixed_frames_and_the_descriptions_are_latched_and_nothing_else_is() {
 }
 
 #[test]
-fn gains_and_params_have_the_members_that_their_services_have_as_fields() {
+fn parts_of_a_question_have_the_members_that_their_services_have_as_fields() {
     for service in [Service::Stability, Service::Rollout] {
         for field in service.fields() {
             let members = match field.name {
                 "gains" => Service::SetGains.fields(),
                 "params" => Service::SetParams.fields(),
+                "limits" => Service::SetLimits.fields(),
+                "sensors" => Service::SetSensors.fields(),
                 _ => &[],
             };
             assert_eq!(field.members(), members, "{field:?}");
@@ -58,8 +60,13 @@ fn names_and_types_are_given_once_and_in_the_form_that_ros_gives_them() {
     let services = Service::ALL.map(|service| (service.name(), service.type_name(), "srv"));
     let mut seen = HashSet::new();
     for (name, type_name, kind) in topics.into_iter().chain(services) {
-        // Moving and fixed frames have the same type, and so have all texts.
-        let shares = ["/tf_static", "/robot_description_semantic"].contains(&name);
+        // Moving and fixed frames have the same type, and so have all texts, and true and measured states.
+        let shares = [
+            "/tf_static",
+            "/robot_description_semantic",
+            "/joint_states_measured",
+        ]
+        .contains(&name);
         assert!(
             seen.insert(name) && (seen.insert(type_name) || shares),
             "{name} or {type_name} is listed twice"

@@ -13,11 +13,11 @@ use pendularm::study::stability::{limit_held, limits};
 
 use crate::stored::gains;
 
-fn control(period: f64, delay: bool) -> ControlLoop<2> {
+fn control(period: f64, delay: u8) -> ControlLoop<2> {
     controlled(Gains::default(), [0.4, 0.8], period, delay)
 }
 
-fn controlled(gains: Gains<2>, setpoint: [f64; 2], period: f64, delay: bool) -> ControlLoop<2> {
+fn controlled(gains: Gains<2>, setpoint: [f64; 2], period: f64, delay: u8) -> ControlLoop<2> {
     let control = ControlLoop::new(Arm::default(), gains, Setpoint::at(setpoint));
     control.with_period(ControlPeriod { period, delay })
 }
@@ -28,7 +28,7 @@ fn dies_out(control: &ControlLoop<2>) -> bool {
     // The integral takes up the load first, at a period that is stable.
     simulation.set_control_period(ControlPeriod {
         period: 1e-3,
-        delay: false,
+        delay: 0,
     });
     simulation.set_timestep(1e-3);
     simulation.advance(20_000);
@@ -46,9 +46,9 @@ fn dies_out(control: &ControlLoop<2>) -> bool {
 #[test]
 fn the_limit_of_the_control_period_is_that_of_exact_motion() {
     let weak = gains([30.0, 0.01], [0.0; 2], [30.0, 0.01]);
-    let mut soft = controlled(weak, [0.0; 2], 0.01, false);
+    let mut soft = controlled(weak, [0.0; 2], 0.01, 0);
     soft.arm = Arm::new([4.0, 0.1], [1.0; 2], 9.81).unwrap();
-    let cases = [control(0.01, false), control(0.01, true), soft];
+    let cases = [control(0.01, 0), control(0.01, 1), soft];
     let exact = [8.208519896e-3, 4.01389607e-3, 0.1496851889];
     for (control, exact) in cases.iter().zip(exact) {
         let limit = clock_limits(control).period.unwrap();
@@ -60,7 +60,7 @@ fn the_limit_of_the_control_period_is_that_of_exact_motion() {
 fn the_limit_of_the_timestep_is_the_longest_whole_part_of_the_period_that_is_stable() {
     for method in Method::ALL {
         for period in [2e-3, 5e-3, 7.5e-3, 8.1e-3] {
-            let sampled = control(period, false).with_method(method);
+            let sampled = control(period, 0).with_method(method);
             let limit = clock_limits(&sampled).timestep.unwrap();
             if limit > period {
                 assert_eq!(Some(limit), limit_held(&sampled));
@@ -75,7 +75,7 @@ fn the_limit_of_the_timestep_is_the_longest_whole_part_of_the_period_that_is_sta
             }
         }
         // Beyond the period's own limit no timestep helps.
-        let beyond = control(9e-3, false).with_method(method);
+        let beyond = control(9e-3, 0).with_method(method);
         assert_eq!(clock_limits(&beyond).timestep, Some(0.0));
     }
 }
@@ -84,10 +84,10 @@ fn the_limit_of_the_timestep_is_the_longest_whole_part_of_the_period_that_is_sta
 #[test]
 fn the_limits_over_all_poses_and_the_advice_include_a_late_effort() {
     let at = |delay| controlled(Gains::default(), [0.8, -0.6], 0.0, delay);
-    let (prompt, late) = (limits(&at(false)), limits(&at(true)));
+    let (prompt, late) = (limits(&at(0)), limits(&at(1)));
     assert!(late.held < prompt.held && late.minimum_held < prompt.minimum_held);
     assert!(late.minimum_held <= late.held && late.bound.is_none());
-    assert_eq!(late.held, clock_limits(&at(true)).timestep);
+    assert_eq!(late.held, clock_limits(&at(1)).timestep);
     assert!(late.advised <= late.minimum_held.map(|least| 0.8 * least));
 }
 
@@ -95,7 +95,7 @@ fn the_limits_over_all_poses_and_the_advice_include_a_late_effort() {
 #[test]
 fn a_loop_that_its_integral_drives_has_no_stable_timestep() {
     let gains = gains([60.0, 30.0], [2000.0, 0.0], [25.0, 8.0]);
-    for delay in [false, true] {
+    for delay in [0, 1] {
         let found = clock_limits(&controlled(gains, [0.0; 2], 0.0, delay));
         assert_eq!([found.period, found.timestep], [Some(0.0); 2], "{delay}");
     }
@@ -105,7 +105,7 @@ fn a_loop_that_its_integral_drives_has_no_stable_timestep() {
 #[test]
 fn there_is_advice_for_a_control_period_up_to_it_alone() {
     let advised = |period: f64| {
-        let control = controlled(Gains::default(), [0.0; 2], period, false);
+        let control = controlled(Gains::default(), [0.0; 2], period, 0);
         limits(&control).advised_for(&Motion::ahead(&control, &State::rest()))
     };
     let every_step = advised(0.0).unwrap();
@@ -118,7 +118,7 @@ fn at_one_control_period_a_shorter_timestep_lowers_the_methods_error_by_its_orde
  {
     let gains = gains([200.0, 100.0], [0.0; 2], [30.0, 12.0]);
     let errors = |method: Method, timestep: f64| {
-        let control = controlled(gains, [0.8, -0.6], 0.01, false).with_method(method);
+        let control = controlled(gains, [0.8, -0.6], 0.01, 0).with_method(method);
         let request = RolloutRequest {
             control: control.with_timestep(timestep),
             start: State::rest(),

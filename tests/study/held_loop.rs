@@ -560,7 +560,7 @@ fn check_arm<const N: usize>(lengths: [f64; N], masses: [f64; N]) {
         })
         .collect();
     for method in Method::ALL {
-        for (steps, delay) in [(1, 0), (4, 0), (1, 1), (3, 1)] {
+        for (steps, delay) in [(1, 0), (4, 0), (1, 1), (3, 1), (1, 2), (2, 3), (1, 8)] {
             let held = Given {
                 kp: vec![gains.kp.to_vec()],
                 ki: vec![gains.ki.to_vec()],
@@ -571,7 +571,7 @@ fn check_arm<const N: usize>(lengths: [f64; N], masses: [f64; N]) {
                 between: explicit(method),
                 ..given(mass_matrix(&arm, &pose).map(|row| row.to_vec()).to_vec())
             };
-            let expected = Stepping::held(&linear, method, steps as u32, delay > 0)
+            let expected = Stepping::held(&linear, method, steps as u32, delay as u8)
                 .limit()
                 .unwrap();
             let limit = answer(&held, None).period_limit.unwrap();

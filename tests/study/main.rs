@@ -34,6 +34,7 @@ mod reference;
 mod report;
 mod rollout;
 mod scenarios;
+mod sensors;
 mod stability;
 #[path = "../support/stored.rs"]
 mod stored;

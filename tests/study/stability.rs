@@ -82,7 +82,7 @@ fn the_held_law_is_stepped_in_the_shipped_order() {
     let (kp, ki, kd, h) = (30.0, 40.0, 7.0, 0.05);
     let inertia = Linear::oscillator(0.0, kp, ki, kd);
     for (method, substeps, pushed) in [(Method::Rk4, 1, 0.5), (Method::Euler, 2, 0.25)] {
-        let matrix = Stepping::held(&inertia, method, substeps, false).matrix(h);
+        let matrix = Stepping::held(&inertia, method, substeps, 0).matrix(h);
         for start in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
             let [x, v, s]: [f64; 3] = start;
             let s = s - h * x;

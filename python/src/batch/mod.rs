@@ -363,7 +363,7 @@ impl Batch {
             let delay = delays.as_deref().and_then(|delays| of_arm(delays, row));
             one.set_control_period(ControlPeriod {
                 period: periods.as_ref().map_or(present.period, |periods| periods.number(row)),
-                delay: delay.unwrap_or(present.delay),
+                delay: delay.map_or(present.delay, u8::from),
             });
         })
     }

@@ -2,12 +2,13 @@
 //!
 //! **Invariant:** a continued simulation takes the same steps, bit for bit, as the stored one would.
 
-use super::hold::{Held, Hold};
+use super::hold::{Held, Hold, Memory};
 use super::{Disturbance, Divergence, Simulation};
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::math::limits::Limits;
 use crate::math::pid::{Gains, Pid, Setpoint};
+use crate::math::sensors::Sensors;
 
 /// The whole state of a simulation between two steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +27,10 @@ pub struct Checkpoint<const N: usize> {
     pub held: Held<N>,
     /// The limits of the motors, and the anti-windup.
     pub limits: Limits<N>,
+    /// What the controller measures.
+    pub sensors: Sensors<N>,
+    /// What it has measured, and the efforts that wait.
+    pub memory: Memory<N>,
     /// The method that takes the steps.
     pub method: Method,
     /// Length of a step \[s\], greater than 0.
@@ -60,6 +65,8 @@ impl<const N: usize> Simulation<N> {
             enabled: self.pid.is_enabled(),
             held: self.hold.held,
             limits: self.hold.limits,
+            sensors: self.hold.sensors,
+            memory: self.hold.memory(),
             method: self.method,
             timestep: self.timestep,
             state: self.state,
@@ -83,7 +90,12 @@ impl<const N: usize> Simulation<N> {
         Self {
             arm: from.arm,
             pid,
-            hold: Hold::new(from.held, from.limits, from.timestep),
+            hold: Hold::new(
+                from.held,
+                from.limits,
+                (from.sensors, from.memory),
+                from.timestep,
+            ),
             method: from.method,
             timestep: from.timestep,
             state: from.state,

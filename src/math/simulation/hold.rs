@@ -2,29 +2,31 @@
 //! while the controller is off; or the effort of an external controller.
 //!
 //! A control period has `k` steps. `k` is the whole number nearest to the requested period divided by the timestep,
-//! and at least 1. The law runs on the state at the start of the period, with `k` timesteps as its `dt`. With a delay,
-//! its result is applied one period later, as if the computation took a whole period (Åström and Wittenmark,
-//! Computer-Controlled Systems, 3rd ed., section 1.3).
+//! and at least 1. The law runs on what the sensors measure at the start of the period, with `k` timesteps as its `dt`.
+//! With a delay, its result is applied whole periods later, as if measurement, bus and computation took so long (Åström and
+//! Wittenmark, Computer-Controlled Systems, 3rd ed., section 1.3).
 //!
 //! Limits of the motors bound the effort when it is applied, so a new limit also bounds an effort that is already held.
 //!
-//! **Invariant:** with a period of one step, no delay and no limits the law runs in every step, with the timestep as its `dt`.
+//! **Invariant:** with a period of one step, no delay, exact sensors and no limits the law runs in every step, with the
+//! timestep as its `dt`.
 
 use crate::math::arm::State;
 use crate::math::count::{in_f64, whole};
 use crate::math::limits::Limits;
 use crate::math::pid::{Control, Pid};
+use crate::math::sensors::{MAX_DELAY, Sensors};
 
 /// Most steps of a control period. Whole numbers up to it are exact as `f64`, and this number of steps takes years.
 const MOST_STEPS: u64 = 1 << 53;
 
-/// The time between two runs of the law, and whether their results are delayed.
+/// The time between two runs of the law, and the delay of their results.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ControlPeriod {
     /// Requested time \[s\], not negative; 0 means every step.
     pub period: f64,
-    /// Whether a result is applied one period after its state was read.
-    pub delay: bool,
+    /// The number of periods after which a result is applied, up to [`MAX_DELAY`].
+    pub delay: u8,
 }
 
 impl ControlPeriod {
@@ -50,7 +52,7 @@ pub struct Held<const N: usize> {
     pub due: u64,
     /// The controller's present effort \[N m\].
     pub effort: [f64; N],
-    /// With a delay, the effort of the next period \[N m\].
+    /// With a delay, the latest result of the law \[N m\].
     pub computed: [f64; N],
     /// Effort of clients, applied while the controller is off \[N m\].
     pub command: [f64; N],
@@ -72,86 +74,164 @@ impl<const N: usize> Default for Held<N> {
     }
 }
 
+/// Results of the law that wait before [`Held::computed`], if the delay is that long.
+const WAITING: usize = MAX_DELAY as usize - 1;
+
+/// What sensors and a delay of several periods remember between two runs of the law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Memory<const N: usize> {
+    /// The latest measurement, since the arm was last put into another state and a control period began.
+    pub measured: Option<State<N>>,
+    /// The efforts \[N m\] that are applied before [`Held::computed`], the next one first. There is one less than the
+    /// delay has periods.
+    pub waiting: [[f64; N]; WAITING],
+}
+
+impl<const N: usize> Default for Memory<N> {
+    fn default() -> Self {
+        Self {
+            measured: None,
+            waiting: [[0.0; N]; WAITING],
+        }
+    }
+}
+
+/// What is held after a step, and remembered.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct After<const N: usize> {
+    pub(in crate::math) held: Held<N>,
+    /// What the law has measured, if it ran and there is a [`Memory`].
+    measured: Option<State<N>>,
+}
+
 /// The held effort, with values computed from it and the timestep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hold<const N: usize> {
     pub(in crate::math) held: Held<N>,
     /// What the motors can apply. It holds for every effort here.
     pub(in crate::math) limits: Limits<N>,
+    pub(in crate::math) sensors: Sensors<N>,
+    /// Only for sensors that are not exact, and a delay of several periods.
+    memory: Option<Box<Memory<N>>>,
     /// Steps per period.
     steps: u64,
     /// Duration of a period \[s\].
     length: f64,
-    /// Whether the law, if it is on, runs in every step without delay and limits, and no other effort replaces it.
+    /// Whether the law, if it is on, runs in every step without delay, sensors and limits, and no other effort replaces
+    /// it.
     pub(in crate::math) every_step: bool,
 }
 
 impl<const N: usize> Hold<N> {
     /// The held effort, in steps of `timestep` \[s\].
     #[must_use]
-    pub fn new(held: Held<N>, limits: Limits<N>, timestep: f64) -> Self {
+    pub fn new(
+        held: Held<N>,
+        limits: Limits<N>,
+        (sensors, memory): (Sensors<N>, Memory<N>),
+        timestep: f64,
+    ) -> Self {
         let steps = held.period.steps(timestep);
+        let remembers = held.period.delay > 1 || !sensors.are_exact();
         Self {
             steps,
             length: in_f64(steps) * timestep,
             every_step: steps == 1
-                && !held.period.delay
+                && held.period.delay == 0
                 && held.driven.is_none()
                 && limits.are_absent()
+                && !remembers
                 && held.command.iter().all(|effort| effort.to_bits() == 0),
             held,
             limits,
+            sensors,
+            memory: remembers.then(|| Box::new(memory)),
         }
     }
 
-    /// A period begins with the next step; `change` is made before.
+    /// What is remembered between two runs of the law.
+    pub(super) fn memory(&self) -> Memory<N> {
+        self.memory.as_deref().copied().unwrap_or_default()
+    }
+
+    /// The same effort with other values.
+    fn change(&mut self, timestep: f64, change: impl FnOnce(&mut Held<N>, &mut Memory<N>)) {
+        let (mut held, mut memory) = (self.held, self.memory());
+        change(&mut held, &mut memory);
+        *self = Self::new(held, self.limits, (self.sensors, memory), timestep);
+    }
+
+    /// A period begins with the next step; `change` is made before. A difference of positions begins too.
     pub(super) fn begin_period(&mut self, timestep: f64, change: impl FnOnce(&mut Held<N>)) {
-        let mut held = self.held;
-        held.due = 0;
-        change(&mut held);
-        *self = Self::new(held, self.limits, timestep);
+        self.change(timestep, |held, memory| {
+            held.due = 0;
+            memory.measured = None;
+            let delay = held.period.delay;
+            change(held);
+            if held.period.delay != delay {
+                memory.waiting = [held.computed; WAITING];
+            }
+        });
     }
 
     /// Changes the limits from the next step on, within the period.
     pub(super) fn set_limits(&mut self, limits: Limits<N>, timestep: f64) {
-        *self = Self::new(self.held, limits, timestep);
+        self.limits = limits;
+        self.change(timestep, |_, _| ());
+    }
+
+    /// Changes the sensors from the next run of the law on, within the period.
+    pub(super) fn set_sensors(&mut self, sensors: Sensors<N>, timestep: f64) {
+        self.sensors = sensors;
+        self.change(timestep, |_, memory| memory.measured = None);
+    }
+
+    /// The arm is in another state, so a difference to the old one is no velocity.
+    pub(super) fn forget_measurement(&mut self) {
+        if let Some(memory) = &mut self.memory {
+            memory.measured = None;
+        }
     }
 
     /// Sets the clients' effort \[N m\].
     pub(super) fn set_command(&mut self, command: [f64; N], timestep: f64) {
-        *self = Self::new(
-            Held {
-                command,
-                ..self.held
-            },
-            self.limits,
-            timestep,
-        );
+        self.change(timestep, |held, _| held.command = command);
     }
 
     /// Clears all efforts. A period begins with the next step.
     pub(super) fn forget(&mut self, timestep: f64) {
-        self.begin_period(timestep, |held| {
+        self.change(timestep, |held, memory| {
             *held = Held {
                 period: held.period,
                 ..Held::default()
             };
+            *memory = Memory::default();
         });
     }
 
     /// The control for the step that begins now, from `state`, and the held values after it. The law runs if it is due.
     #[must_use]
-    pub fn begin_step(&self, pid: &Pid<N>, state: &State<N>) -> (Control<N>, Held<N>) {
+    pub fn begin_step(&self, pid: &Pid<N>, state: &State<N>) -> (Control<N>, After<N>) {
         let mut held = self.held;
         let mut integral = *pid.integral();
+        let mut measured = None;
         let effort = match held.driven {
             Some(effort) => effort,
             None if !pid.is_enabled() => held.command,
             None => {
                 if held.due == 0 {
+                    measured = self.memory.as_ref().map(|memory| {
+                        let before = memory.measured.as_ref();
+                        self.sensors.measured(state, before, self.length)
+                    });
+                    let state = measured.as_ref().unwrap_or(state);
                     let control = self.limits.control(pid, state, self.length);
-                    held.effort = if held.period.delay {
-                        std::mem::replace(&mut held.computed, control.effort)
+                    held.effort = if held.period.delay > 0 {
+                        let oldest = std::mem::replace(&mut held.computed, control.effort);
+                        match &self.memory {
+                            Some(memory) if held.period.delay > 1 => memory.waiting[0],
+                            _ => oldest,
+                        }
                     } else {
                         control.effort
                     };
@@ -163,7 +243,13 @@ impl<const N: usize> Hold<N> {
             }
         };
         let effort = self.limits.applied(effort);
-        (Control { effort, integral }, held)
+        (Control { effort, integral }, After { held, measured })
+    }
+
+    /// What the law measured in its latest run, or what it would measure in its first one.
+    pub(super) fn measured(&self, state: &State<N>) -> State<N> {
+        let latest = self.memory.as_ref().and_then(|memory| memory.measured);
+        latest.unwrap_or_else(|| self.sensors.measured(state, None, self.length))
     }
 
     /// The joints whose motor was at its limit in the latest step.
@@ -178,7 +264,16 @@ impl<const N: usize> Hold<N> {
     }
 
     /// Commits a step: its effort is held from now on.
-    pub fn commit(&mut self, held: Held<N>) {
-        self.held = held;
+    pub fn commit(&mut self, after: After<N>) {
+        if let (Some(memory), Some(measured)) = (&mut self.memory, after.measured) {
+            memory.measured = Some(measured);
+            // The result before this one waits in its turn.
+            let last = usize::from(self.held.period.delay).saturating_sub(2);
+            memory.waiting.copy_within(1.., 0);
+            if let Some(place) = memory.waiting.get_mut(last) {
+                *place = self.held.computed;
+            }
+        }
+        self.held = after.held;
     }
 }

@@ -7,6 +7,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::math::limits::Limits;
 use crate::math::pid::{Gains, Setpoint};
+use crate::math::sensors::Sensors;
 
 /// An external change, effective from the next step on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +35,8 @@ pub enum ArmInput<const N: usize> {
     Period(ControlPeriod),
     /// The limits of the motors, and the anti-windup.
     Limits(Limits<N>),
+    /// What the controller measures.
+    Sensors(Sensors<N>),
     /// Positions and velocities of the joints.
     State(State<N>),
     /// An effort that is applied while the controller is off \[N m\].
@@ -70,6 +73,7 @@ impl<const N: usize> Simulation<N> {
             ArmInput::Disturbance { effort, duration } => self.disturb(effort, duration),
             ArmInput::Period(period) => self.set_control_period(period),
             ArmInput::Limits(limits) => self.set_limits(limits),
+            ArmInput::Sensors(sensors) => self.set_sensors(sensors),
             ArmInput::State(state) => self.set_state(state),
             ArmInput::Command(effort) => self.set_command(effort),
             ArmInput::Drive(effort) => self.drive(effort),

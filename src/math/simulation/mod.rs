@@ -31,7 +31,7 @@ mod input;
 use std::ops::ControlFlow;
 
 pub use self::checkpoint::Checkpoint;
-pub use self::hold::{ControlPeriod, Held, Hold};
+pub use self::hold::{After, ControlPeriod, Held, Hold, Memory};
 pub(crate) use self::increments::add_carried;
 use self::increments::{leaves_out_first_angle, stepped};
 pub use self::increments::{state_after, step_under};
@@ -41,6 +41,7 @@ use super::dynamics::{forward_dynamics, less_friction, weightless_dynamics};
 use super::integrator::Method;
 use super::limits::Limits;
 use super::pid::{Control, Gains, Pid, Setpoint};
+use super::sensors::Sensors;
 
 /// Default timestep \[s\]: at most a third of the stability limit of the default gains.
 pub const DEFAULT_TIMESTEP: f64 = 0.001;
@@ -121,7 +122,12 @@ impl<const N: usize> Simulation<N> {
         Self {
             arm,
             pid: Pid::new(gains),
-            hold: Hold::new(Held::default(), Limits::default(), DEFAULT_TIMESTEP),
+            hold: Hold::new(
+                Held::default(),
+                Limits::default(),
+                Default::default(),
+                DEFAULT_TIMESTEP,
+            ),
             method: Method::Rk4,
             timestep: DEFAULT_TIMESTEP,
             state: State::rest(),
@@ -280,7 +286,7 @@ impl<const N: usize> Simulation<N> {
 
     /// The control of a step whose period has several steps.
     #[inline(never)]
-    fn begin_held_step(&self, after: &mut Option<Held<N>>) -> Control<N> {
+    fn begin_held_step(&self, after: &mut Option<After<N>>) -> Control<N> {
         let (control, held) = self.hold.begin_step(&self.pid, &self.state);
         *after = Some(held);
         control
@@ -306,7 +312,7 @@ impl<const N: usize> Simulation<N> {
 
     /// Returns to the starting pose at rest, at time 0. Setpoint and integral are reset, all efforts are zero,
     /// disturbance and divergence end, and a control period begins. Gains, arm, method, timestep, control period,
-    /// limits and the controller's on/off state do not change.
+    /// limits, sensors and the controller's on/off state do not change.
     pub fn reset(&mut self) {
         self.set_state(State::rest());
         self.pid.reset();
@@ -325,11 +331,12 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// Puts the arm into another state, which must be finite, and ends a divergence. Clock and controller do
-    /// not change.
+    /// not change. The next measured difference of positions is zero.
     pub fn set_state(&mut self, state: State<N>) {
         self.state = state;
         self.carry = State::rest();
         self.divergence = None;
+        self.hold.forget_measurement();
     }
 
     /// Effort of the latest step \[N m\], that of the motors plus the disturbance's. It is zero as soon as the
@@ -436,6 +443,26 @@ impl<const N: usize> Simulation<N> {
     /// must be finite and not negative, and the tracking time greater than 0.
     pub fn set_limits(&mut self, limits: Limits<N>) {
         self.hold.set_limits(limits, self.timestep);
+    }
+
+    /// The sensors of the controller.
+    #[must_use]
+    pub fn sensors(&self) -> &Sensors<N> {
+        &self.hold.sensors
+    }
+
+    /// Changes the sensors from the next run of the control law on. The integral and the control period go on, and the
+    /// first difference of positions is zero. Each step of an encoder must be finite and not negative.
+    pub fn set_sensors(&mut self, sensors: Sensors<N>) {
+        self.hold.set_sensors(sensors, self.timestep);
+    }
+
+    /// What the control law has measured in its latest run \[rad, rad/s\]. If there is none since the controller was
+    /// switched on, the arm was put into another state or a control period began at once, it is what the first run would
+    /// measure now.
+    #[must_use]
+    pub fn measured(&self) -> State<N> {
+        self.hold.measured(&self.state)
     }
 
     /// The joints whose motor was at its limit in the latest step. A joint without a motor is not among them.

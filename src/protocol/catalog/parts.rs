@@ -17,6 +17,18 @@ pub(super) const GAINS: &[Field] = fields![
     "float64[] ki?  # N m/(rad s)",
     "float64[] kd?  # N m s/rad",
 ];
+/// The members of `limits` in a request are the fields of `/pid_controller/set_limits`.
+pub(super) const LIMITS: &[Field] = fields![
+    "float64[] effort?  # N m",
+    "string anti_windup?",
+    "float64 tracking_time?  # s",
+];
+/// The members of `sensors` in a request are the fields of `/pid_controller/set_sensors`.
+pub(super) const SENSORS: &[Field] = fields![
+    "float64[] encoder_step?  # rad",
+    "string velocity?",
+    "uint64 delay?",
+];
 
 /// A viewer's request: frames relative to another frame.
 pub(super) const FRAME_GOAL: &[Field] = fields![
@@ -101,6 +113,8 @@ pub(super) const TYPES: &[Type] = types! {
     ],
     "pendularm_interfaces/msg/Gains": GAINS,
     "pendularm_interfaces/msg/Params": PARAMS,
+    "pendularm_interfaces/msg/Limits": LIMITS,
+    "pendularm_interfaces/msg/Sensors": SENSORS,
     "pendularm_interfaces/msg/CriticalMode": [
         "float64 growth_per_step",
         "float64 frequency  # Hz",

@@ -5,7 +5,7 @@
 
 use super::entry::{Field, ServiceEntry, fields, service};
 use super::node::Node;
-use super::parts::{GAINS, PARAMS};
+use super::parts::{GAINS, LIMITS, PARAMS, SENSORS};
 use super::rosapi::Rosapi;
 use super::table::{named, table};
 use super::topics::{ARM_STATE, ARM_STATE_AND_FEEDBACK};
@@ -110,6 +110,10 @@ table! {
         SetLimits = changes("/pid_controller/set_limits", "pendularm_interfaces/srv/SetLimits")
             .request(LIMITS)
             .response(LIMITS),
+        /// What the controller measures, and the delay of its efforts.
+        SetSensors = changes("/pid_controller/set_sensors", "pendularm_interfaces/srv/SetSensors")
+            .request(SENSORS)
+            .response(SENSORS),
         /// Joint positions for an end effector position.
         Solve = service("/ik/solve", "pendularm_interfaces/srv/Solve", Node::Ik)
             .request(fields!["float64 x  # m", "float64 y  # m", "float64 phi?  # rad"])
@@ -159,9 +163,12 @@ table! {
                 "pendularm_interfaces/msg/Params params?  # SI",
                 "float64[] setpoint?  # rad",
                 "float64 control_period?  # s",
-                "bool delay?",
+                "uint64 delay?",
                 "float64[] q?  # rad",
                 "float64[] qd?  # rad/s",
+                "float64[] viscous?  # N m s/rad",
+                "pendularm_interfaces/msg/Limits limits?  # SI",
+                "pendularm_interfaces/msg/Sensors sensors?  # SI",
             ])
             .response(fields![
                 "float64 control_period_limit  # s",
@@ -225,9 +232,12 @@ table! {
                 "uint64 samples?",
                 "bool reference?",
                 "float64 control_period?  # s",
-                "bool delay?",
+                "uint64 delay?",
                 "float64[] q?  # rad",
                 "float64[] qd?  # rad/s",
+                "float64[] viscous?  # N m s/rad",
+                "pendularm_interfaces/msg/Limits limits?  # SI",
+                "pendularm_interfaces/msg/Sensors sensors?  # SI",
             ])
             .response(fields![
                 "float64[] times  # s",
@@ -253,7 +263,10 @@ table! {
                 "float64 timestep?  # s",
                 "string integrator?",
                 "pendularm_interfaces/msg/Params params?  # SI",
-                "bool delay?",
+                "uint64 delay?",
+                "float64[] viscous?  # N m s/rad",
+                "pendularm_interfaces/msg/Limits limits?  # SI",
+                "pendularm_interfaces/msg/Sensors sensors?  # SI",
             ])
             .response(fields![
                 "float64[] kp  # N m/rad",
@@ -278,9 +291,12 @@ table! {
                 "pendularm_interfaces/msg/Gains gains?  # SI",
                 "float64[] setpoint?  # rad",
                 "float64 control_period?  # s",
-                "bool delay?",
+                "uint64 delay?",
                 "float64[] q?  # rad",
                 "float64[] qd?  # rad/s",
+                "float64[] viscous?  # N m s/rad",
+                "pendularm_interfaces/msg/Limits limits?  # SI",
+                "pendularm_interfaces/msg/Sensors sensors?  # SI",
             ])
             .response(fields![
                 "string integrator",
@@ -323,11 +339,6 @@ const fn changes(name: &'static str, type_name: &'static str) -> ServiceEntry {
 
 const METHOD: &[Field] = fields!["string method?", "float64 timestep?  # s",];
 const STATE: &[Field] = fields!["float64[] position  # rad", "float64[] velocity  # rad/s",];
-const LIMITS: &[Field] = fields![
-    "float64[] effort?  # N m",
-    "string anti_windup?",
-    "float64 tracking_time?  # s",
-];
 const NAMES: &[Field] = fields!["string[] names"];
 const SWITCH: &[Field] = fields!["bool data?"];
 const DISTURBANCE: &[Field] = fields!["float64[] effort  # N m", "float64 duration  # s",];

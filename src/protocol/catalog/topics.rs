@@ -30,6 +30,14 @@ table! {
             "float64[] velocity  # rad/s",
             "float64[] effort  # N m",
         ]),
+        /// What the controller measures, 60 Hz.
+        MeasuredStates = published("/joint_states_measured", Node::ArmSim, "sensor_msgs/msg/JointState", fields![
+            "std_msgs/msg/Header header",
+            "string[] name",
+            "float64[] position  # rad",
+            "float64[] velocity  # rad/s",
+            "float64[] effort  # N m",
+        ]),
         /// Simulation time, 60 Hz.
         Clock = published("/clock", Node::ArmSim, "rosgraph_msgs/msg/Clock", fields![
             "builtin_interfaces/msg/Time clock  # s, ns",
@@ -135,9 +143,10 @@ macro_rules! spellings {
 
 /// Topics of the arm's state. `/diagnostics` is not among them: its message about a change is sent before the answer,
 /// and stays valid.
-pub(super) const ARM_STATE: &[&str] = spellings![JointStates, Clock, Tf];
+pub(super) const ARM_STATE: &[&str] = spellings![JointStates, MeasuredStates, Clock, Tf];
 /// The same, and the feedback of a goal: after a pause and a reset none is due.
-pub(super) const ARM_STATE_AND_FEEDBACK: &[&str] = spellings![JointStates, Clock, Tf, IkFeedback];
+pub(super) const ARM_STATE_AND_FEEDBACK: &[&str] =
+    spellings![JointStates, MeasuredStates, Clock, Tf, IkFeedback];
 
 named!(Topic, |_: &str| None);
 

@@ -43,6 +43,18 @@ table! {
         AntiWindup = field_of(Service::SetLimits, "anti_windup"),
         /// The tracking time of the back calculation \[s\].
         TrackingTime = field_of(Service::SetLimits, "tracking_time"),
+        /// The steps of the encoders \[rad\].
+        EncoderStep = field_of(Service::SetSensors, "encoder_step"),
+        /// How the controller measures velocities.
+        MeasuredVelocity = ParameterEntry {
+            name: "measured_velocity",
+            ..field_of(Service::SetSensors, "velocity")
+        },
+        /// The delay of the efforts \[control periods\].
+        ControlDelay = ParameterEntry {
+            name: "control_delay",
+            ..field_of(Service::SetSensors, "delay")
+        },
         /// The arm as URDF, computed from lengths and masses; read only.
         RobotDescription = ParameterEntry { name: "robot_description", field: None },
     }
@@ -58,6 +70,8 @@ pub const MAX_NAMED: usize = 64;
 /// The type of a parameter, a value of `rcl_interfaces/msg/ParameterType`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterType {
+    /// A whole number.
+    Integer = 2,
     /// A number.
     Double = 3,
     /// A string.
@@ -71,6 +85,7 @@ impl ParameterType {
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Integer => "integer",
             Self::Double => "double",
             Self::Text => "string",
             Self::DoubleArray => "double array",
@@ -126,6 +141,7 @@ impl Parameter {
     #[must_use]
     pub fn kind(self) -> ParameterType {
         match self.unit_and_kind() {
+            (_, "uint64") => ParameterType::Integer,
             (_, "float64") => ParameterType::Double,
             (_, "float64[]") => ParameterType::DoubleArray,
             _ => ParameterType::Text,

@@ -16,7 +16,7 @@ use std::fmt;
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{gravity_load, mass_matrix};
 use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::{Checkpoint, ControlPeriod, Held, Simulation};
+use crate::math::simulation::{Checkpoint, ControlPeriod, Held, Memory, Simulation};
 use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
@@ -70,8 +70,8 @@ impl LimitPair {
         })
     }
 
-    /// Of the control period, with `substeps` steps of the method in each; `delay`: every effort acts one period late.
-    pub fn of_period<const N: usize>(control: &ControlLoop<N>, substeps: u32, delay: bool) -> Self {
+    /// Of the control period, with `substeps` steps of the method in each; every effort acts `delay` periods late.
+    pub fn of_period<const N: usize>(control: &ControlLoop<N>, substeps: u32, delay: u8) -> Self {
         let linear = Linear::at_setpoint(control);
         let stepping = Stepping::held(&linear, control.method, substeps, delay);
         Self::of(stepping.limit(), |period| {
@@ -195,30 +195,35 @@ fn energy_about<const N: usize>(
     }
 }
 
-/// The live loop in `state`, with the integral and the delayed effort of its equilibrium.
+/// The live loop in `state`, with the integral and the efforts on their way of its equilibrium.
 pub(super) fn live_at<const N: usize>(
     control: &ControlLoop<N>,
     rest: &Equilibrium<N>,
     state: State<N>,
 ) -> Simulation<N> {
     let live = control.simulation(state).checkpoint();
+    let load = gravity_load(&control.arm, &rest.position);
     let held = Held {
-        computed: gravity_load(&control.arm, &rest.position),
+        computed: load,
         ..live.held
     };
     Simulation::continued(&Checkpoint {
         integral: rest.integral,
         held,
+        memory: Memory {
+            measured: Some(State::at_rest(rest.position)),
+            waiting: live.memory.waiting.map(|_| load),
+        },
         ..live
     })
 }
 
-/// The same loop with its timestep \[s\] as its control period, in `substeps` steps; `delay`: every effort acts one
-/// period late.
+/// The same loop with its timestep \[s\] as its control period, in `substeps` steps; every effort acts `delay`
+/// periods late.
 pub fn in_substeps<const N: usize>(
     control: &ControlLoop<N>,
     substeps: u32,
-    delay: bool,
+    delay: u8,
 ) -> ControlLoop<N> {
     let period = control.timestep;
     control
@@ -243,7 +248,7 @@ fn nudged<const N: usize>(control: &ControlLoop<N>, position: &[f64; N]) -> Stat
 /// timestep is the period. `None` if it is not finite.
 pub fn growth_per_period<const N: usize>(control: &ControlLoop<N>, substeps: u32) -> Option<f64> {
     let period = control.timestep;
-    let control = in_substeps(control, substeps, false);
+    let control = in_substeps(control, substeps, 0);
     let rest = equilibrium(&control);
     let mut live = live_at(&control, &rest, nudged(&control, &rest.position));
     let mut logarithm = 0.0;

@@ -228,7 +228,7 @@ impl Growth {
         plot.add(Curve::line(limit, ends));
         for (turn, (substeps, label, class, marker)) in (0..).zip(SUBSTEPS) {
             let predicted = |substeps, period| {
-                let stepping = Stepping::held(&linear, method, substeps, false);
+                let stepping = Stepping::held(&linear, method, substeps, 0);
                 stepping.matrix(period).spectral_radius()
             };
             let curve = edges(PERIODS, 200).into_iter();
@@ -242,7 +242,7 @@ impl Growth {
             // The dots alternate along the curves, so that no mark hides another. They are denser where the curve
             // rises.
             let even = edges(PERIODS, 3 * dots).into_iter().skip(turn).step_by(3);
-            let limit = Stepping::held(&linear, method, substeps, false).limit();
+            let limit = Stepping::held(&linear, method, substeps, 0).limit();
             let around = [0.985, 0.995, 1.005, 1.015, 1.03, 1.045];
             let steep =
                 around.map(|part| limit.unwrap_or(f64::NAN) * (part + 0.002 * length_in_f64(turn)));

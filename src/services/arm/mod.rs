@@ -14,6 +14,7 @@ mod messages;
 mod parameters;
 mod period;
 mod reset;
+mod sensors;
 mod set_params;
 mod state;
 mod step;
@@ -33,6 +34,7 @@ pub use self::parameters::{
 };
 pub use self::period::{PeriodInForce, SetPeriod};
 pub use self::reset::Reset;
+pub use self::sensors::{SensorsInForce, SetSensors};
 pub use self::set_params::SetParams;
 pub use self::state::SetState;
 pub use self::step::{MAX_STEPS, STEPS_IN_A_ROW, Step, Stepped, StepsEnd};

@@ -8,7 +8,7 @@ use bytes::Bytes;
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
-use super::{SetFriction, SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod};
+use super::{SetFriction, SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod, SetSensors};
 use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, RejectedField, Rejections};
@@ -62,6 +62,8 @@ pub struct NamedParameter {
 pub enum ParameterValue<const N: usize> {
     /// A number.
     Number(f64),
+    /// A whole number.
+    Whole(u8),
     /// One per joint.
     PerJoint([f64; N]),
     /// None, of a parameter that has one per joint if it is set.
@@ -74,6 +76,7 @@ impl<const N: usize> From<ParameterValue<N>> for Value {
     fn from(value: ParameterValue<N>) -> Self {
         match value {
             ParameterValue::Number(number) => number.into(),
+            ParameterValue::Whole(number) => number.into(),
             ParameterValue::PerJoint(numbers) => numbers.to_vec().into(),
             ParameterValue::Unset => Value::Array(Vec::new()),
             ParameterValue::Text(text) => text.into(),
@@ -109,6 +112,8 @@ pub enum ParameterChange<const N: usize> {
     Period(SetPeriod),
     /// The limits of the motors.
     Limits(SetLimits<N>),
+    /// The sensors.
+    Sensors(SetSensors<N>),
 }
 
 /// Why a parameter was not set.
@@ -248,6 +253,7 @@ fn change<const N: usize>(
         Service::SetFriction => ParameterChange::Friction(SetFriction::from_fields(fields)),
         Service::SetGains => ParameterChange::Gains(SetGains::from_fields(fields)),
         Service::SetLimits => ParameterChange::Limits(SetLimits::from_fields(fields)),
+        Service::SetSensors => ParameterChange::Sensors(SetSensors::from_fields(fields)),
         Service::SetPeriod => ParameterChange::Period(SetPeriod::from_fields(fields)),
         _ => ParameterChange::Integrator(SetIntegrator::from_fields(fields)),
     })
@@ -288,7 +294,7 @@ fn read_given<const N: usize>(entry: &RawValue) -> Option<(NamedParameter, Param
     let read = |parameter: Parameter| {
         let expected = parameter.kind();
         let member = match (expected, kind) {
-            (ParameterType::Double, 2) => integer,
+            (ParameterType::Double | ParameterType::Integer, 2) => integer,
             (ParameterType::Double, 3) => double,
             (ParameterType::Text, 4) => string,
             (ParameterType::DoubleArray, 7) => integers,
@@ -421,7 +427,7 @@ fn value_message(named: &NamedParameter, value: Option<Value>) -> Value {
     json!({
         "type": kind.map_or(0, |kind| kind as u8),
         "bool_value": false,
-        "integer_value": 0,
+        "integer_value": of(ParameterType::Integer, json!(0)),
         "double_value": of(ParameterType::Double, json!(0.0)),
         "string_value": of(ParameterType::Text, json!("")),
         "byte_array_value": [],

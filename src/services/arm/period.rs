@@ -1,6 +1,10 @@
 //! `/pid_controller/set_period`: the control period.
 //!
-//! **Invariant:** setting the present values does not change the arm, not even the step in its period.
+//! `delay` is an older name of the delay of `/pid_controller/set_sensors`: `false` is 0 periods and `true` is 1. The answer is
+//! `true` at any delay.
+//!
+//! **Invariant:** setting the present values does not change the arm, not even the step in its period, while the delay is
+//! at most 1.
 
 use bytes::Bytes;
 
@@ -13,7 +17,7 @@ request! {
     pub struct SetPeriod -> Echo<PeriodInForce>, |fields| {
         /// That time \[s\], not negative; 0 for every step.
         period: Option<f64> = fields.number("period", Bound::NonNegative),
-        /// Whether an effort is applied one period after its state was read.
+        /// Whether an effort is applied one period after its state was read, or none.
         delay: Option<bool> = fields.boolean("delay"),
     }
 }
@@ -32,7 +36,7 @@ impl Answered for SetPeriod {
         let values = object! {
             period: values.period.period,
             effective_period: values.effective,
-            delay: values.period.delay,
+            delay: values.period.delay > 0,
         };
         to.response(&values, &rejected.status())
     }

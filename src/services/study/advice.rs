@@ -4,7 +4,7 @@
 
 use bytes::Bytes;
 
-use super::{Computed, Present, Refused, StudyWork, arm_of, state_of, with_period};
+use super::{Computed, Present, Refused, RobotSettings, StudyWork, arm_of, state_of, with_period};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
@@ -33,8 +33,8 @@ pub struct SuggestGains<const N: usize> {
     pub method: Option<Method>,
     /// Changed parameters of the arm.
     pub params: Option<SetParams<N>>,
-    /// Whether an effort acts one step late.
-    pub delay: Option<bool>,
+    /// Friction, limits, sensors and delay.
+    pub robot: RobotSettings<N>,
 }
 
 impl<const N: usize> Ask for SuggestGains<N> {
@@ -74,8 +74,8 @@ request! {
         setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
         /// The control period \[s\]; `None` or 0 to plan it.
         control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
-        /// Whether an effort acts one period late.
-        delay: Option<bool> = super::delay(&mut fields),
+        /// Friction, limits, sensors and delay.
+        robot: RobotSettings<N> = RobotSettings::read(&mut fields),
     }
 }
 
@@ -99,7 +99,7 @@ impl<const N: usize> Callable for SuggestGains<N> {
             timestep: fields.number("timestep", Bound::Positive),
             method: fields.choice("integrator", &Method::ALL, Method::name),
             params: fields.object("params", SetParams::from_fields),
-            delay: super::delay(&mut fields),
+            robot: RobotSettings::read(&mut fields),
         };
         if let Some(margin) = ask.margin.filter(|margin| *margin < 1.0) {
             fields.refuse("margin", &format_args!("must be at least 1, got {margin}"));
@@ -178,13 +178,13 @@ fn demands<const N: usize>(
     present: &ControlLoop<N>,
 ) -> Result<(ControlLoop<N>, GainsRequirements), ArmError> {
     let arm = arm_of(ask.params.as_ref(), present.arm)?;
-    let control = ControlLoop {
+    let control = ask.robot.applied_to(ControlLoop {
         arm,
         method: ask.method.unwrap_or(present.method),
         timestep: ask.timestep.unwrap_or(present.timestep),
-        period: with_period(present.period, Some(0.0), ask.delay),
+        period: with_period(present.period, Some(0.0)),
         ..*present
-    };
+    })?;
     let requirements = GainsRequirements {
         settling_time: ask.settling_time.unwrap_or(DEFAULT_SETTLING),
         margin: ask.margin.unwrap_or(DEFAULT_MARGIN),
@@ -223,17 +223,13 @@ fn task<const N: usize>(ask: &PlanRun<N>, present: &Present<N>) -> Result<Task<N
         false => (no_control(), Gains::default()),
     };
     let gains = ask.gains.as_ref();
-    let control = ControlLoop {
+    let control = ask.robot.applied_to(ControlLoop {
         arm,
         gains: gains.map_or(missing, |gains| gains.applied_to(&present_or_new)),
         setpoint: ask.setpoint.map_or(control.setpoint, Setpoint::at),
-        period: with_period(
-            control.period,
-            Some(ask.control_period.unwrap_or(0.0)),
-            ask.delay,
-        ),
+        period: with_period(control.period, Some(ask.control_period.unwrap_or(0.0))),
         ..*control
-    };
+    })?;
     let usual = if control.is_free() {
         DEFAULT_DURATION
     } else {

@@ -17,12 +17,14 @@ pub use self::held_limit::FindHeldLimit;
 pub use self::integration::{Integrating, IntegrationStep, NotIntegrated};
 pub use self::rollout::{Ran, RolloutWork, RunAnswer, RunOffline};
 pub use self::stability::{PredictStability, Predicted};
-use super::Ask;
-use super::arm::SetParams;
+use super::arm::{SensorsInForce, SetLimits, SetParams, SetSensors};
+use super::{Ask, FieldByField};
 use crate::math::arm::State;
 use crate::math::arm::{Arm, ArmError};
+use crate::math::sensors::MAX_DELAY;
 use crate::math::simulation::ControlPeriod;
 use crate::protocol::op::fields::{Bound, Fields};
+use crate::protocol::wire::json;
 use crate::study::control_loop::ControlLoop;
 use crate::study::paused::Paused;
 use crate::study::stability::most_bytes;
@@ -96,28 +98,75 @@ pub struct Present<const N: usize> {
     pub state: State<N>,
 }
 
-/// The present control period, with another length \[s\] and delay if they are given.
-fn with_period(present: ControlPeriod, period: Option<f64>, delay: Option<bool>) -> ControlPeriod {
+/// The present control period, with another length \[s\] if it is given.
+fn with_period(present: ControlPeriod, period: Option<f64>) -> ControlPeriod {
     ControlPeriod {
         period: period.unwrap_or(present.period),
-        delay: delay.unwrap_or(present.delay),
+        ..present
     }
 }
 
-/// Whether an effort acts one period late: a number of whole periods, 0 or 1, or `false` and `true`.
-fn delay(fields: &mut Fields<'_>) -> Option<bool> {
-    let raw = fields.raw("delay")?;
-    match raw.get() {
-        "false" | "0" => Some(false),
-        "true" | "1" => Some(true),
-        _ => {
-            fields.refuse(
-                "delay",
-                &format_args!("must be 0 or 1 periods, or a boolean"),
-            );
-            None
+/// Friction, limits, sensors and delay of a question, in place of the arm's.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RobotSettings<const N: usize> {
+    /// Viscous friction of the joints \[N m s/rad\].
+    pub viscous: Option<[f64; N]>,
+    /// Changed limits of the motors.
+    pub limits: Option<SetLimits<N>>,
+    /// Changed sensors.
+    pub sensors: Option<SetSensors<N>>,
+    /// The delay \[control periods\], unless the sensors have one.
+    pub delay: Option<u8>,
+}
+
+impl<const N: usize> RobotSettings<N> {
+    fn read(fields: &mut Fields<'_>) -> Self {
+        Self {
+            viscous: fields.array("viscous", Bound::NonNegative),
+            limits: fields.object("limits", SetLimits::from_fields),
+            sensors: fields.object("sensors", SetSensors::from_fields),
+            delay: delay(fields),
         }
     }
+
+    /// `control` with these settings.
+    fn applied_to(&self, control: ControlLoop<N>) -> Result<ControlLoop<N>, ArmError> {
+        let ControlLoop { arm, limits, .. } = control;
+        let present = SensorsInForce {
+            sensors: control.sensors,
+            delay: self.delay.unwrap_or(control.period.delay),
+        };
+        let asked = self.sensors.as_ref();
+        let SensorsInForce { sensors, delay } =
+            asked.map_or(present, |asked| asked.applied_to(&present));
+        let asked = self.limits.as_ref();
+        Ok(ControlLoop {
+            arm: match self.viscous {
+                Some(viscous) => arm.with_friction(viscous)?,
+                None => arm,
+            },
+            limits: asked.map_or(limits, |asked| asked.applied_to(&limits)),
+            sensors,
+            period: ControlPeriod {
+                delay,
+                ..control.period
+            },
+            ..control
+        })
+    }
+}
+
+/// The number of control periods after which an effort acts, or `false` for 0 and `true` for 1.
+fn delay(fields: &mut Fields<'_>) -> Option<u8> {
+    let raw = fields.raw("delay")?;
+    let delay = json::boolean(raw).map(u64::from).or(json::integer(raw));
+    let delay = delay.and_then(|delay| u8::try_from(delay).ok());
+    let delay = delay.filter(|delay| *delay <= MAX_DELAY);
+    if delay.is_none() {
+        let expected = format_args!("must be an integer from 0 to {MAX_DELAY}, or a boolean");
+        fields.refuse("delay", &expected);
+    }
+    delay
 }
 
 /// Joint values under one of two names; the second one is older.

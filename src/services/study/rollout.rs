@@ -10,7 +10,9 @@ use std::time::Duration;
 use bytes::Bytes;
 use serde::{Serialize, Serializer};
 
-use super::{Computed, NUMBER_BYTES, Present, Refused, Work, arm_of, state_of, with_period};
+use super::{
+    Computed, NUMBER_BYTES, Present, Refused, RobotSettings, Work, arm_of, state_of, with_period,
+};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
@@ -43,8 +45,8 @@ request! {
         timestep: Option<f64> = fields.number("timestep", Bound::Positive),
         /// The time between two runs of the control law \[s\], not negative; 0 for every step.
         control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
-        /// Whether an effort acts one period late.
-        delay: Option<bool> = super::delay(&mut fields),
+        /// Friction, limits, sensors and delay.
+        robot: RobotSettings<N> = RobotSettings::read(&mut fields),
         /// The method that takes the steps.
         method: Option<Method> = fields.choice("integrator", &Method::ALL, Method::name),
         /// Changed parameters of the arm.
@@ -195,16 +197,16 @@ fn request<const N: usize>(
     let gains = ask.gains.as_ref();
     let setpoint = ask.setpoint.map(Setpoint::at);
     Ok(RolloutRequest {
-        control: ControlLoop {
+        control: ask.robot.applied_to(ControlLoop {
             arm,
             // Without gains there is no control.
             gains: gains.map_or(no_control(), |gains| gains.applied_to(&Gains::default())),
             setpoint: setpoint.unwrap_or(control.setpoint),
             method: ask.method.unwrap_or(control.method),
             timestep: ask.timestep.unwrap_or(control.timestep),
-            period: with_period(control.period, ask.control_period, ask.delay),
+            period: with_period(control.period, ask.control_period),
             ..*control
-        },
+        })?,
         start: state_of(ask.q, ask.qd, &present.state),
         duration: ask.duration.unwrap_or(DEFAULT_DURATION),
         samples: ask.samples.unwrap_or(DEFAULT_SAMPLES),

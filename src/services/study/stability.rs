@@ -7,7 +7,7 @@
 
 use bytes::Bytes;
 
-use super::{Computed, Present, StudyWork};
+use super::{Computed, Present, RobotSettings, StudyWork};
 use super::{arm_of, state_of, with_period};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
@@ -40,8 +40,8 @@ request! {
         setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
         /// The time between two runs of the control law \[s\], not negative; 0 for every step.
         control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
-        /// Whether an effort acts one period late.
-        delay: Option<bool> = super::delay(&mut fields),
+        /// Friction, limits, sensors and delay.
+        robot: RobotSettings<N> = RobotSettings::read(&mut fields),
         /// Positions from which the motion begins \[rad\].
         q: Option<[f64; N]> = fields.array("q", Bound::Finite),
         /// Velocities there \[rad/s\].
@@ -130,12 +130,12 @@ fn control_loop<const N: usize>(
     let arm = arm_of(ask.params.as_ref(), present.arm)?;
     let gains = ask.gains.as_ref();
     let setpoint = ask.setpoint.map(Setpoint::at);
-    Ok(ControlLoop {
+    ask.robot.applied_to(ControlLoop {
         arm,
         gains: gains.map_or(present.gains, |gains| gains.applied_to(&present.gains)),
         setpoint: setpoint.unwrap_or(present.setpoint),
         method: ask.method.unwrap_or(present.method),
-        period: with_period(present.period, ask.control_period, ask.delay),
+        period: with_period(present.period, ask.control_period),
         ..*present
     })
 }

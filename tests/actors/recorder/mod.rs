@@ -112,7 +112,7 @@ async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::R
         (0..N).map(|_| low + (high - low) * rng.f64()).collect()
     };
     let (poses, weights) = (numbers(-2.0, 2.0), numbers(0.5, 2.0));
-    let (service, args) = match rng.u32(..19) {
+    let (service, args) = match rng.u32(..20) {
         0 => ("/pid_controller/enable", json!({"data": rng.bool()})),
         1 => ("/pid_controller/set_gains", json!({"kp": weights})),
         2 => (
@@ -160,6 +160,14 @@ async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::R
                 json!({"effort": effort, "anti_windup": rng.choice(forms).unwrap(), "tracking_time": 0.01 + rng.f64()}),
             )
         }
+        18 => (
+            "/pid_controller/set_sensors",
+            json!({
+                "encoder_step": if rng.bool() { weights.iter().map(|one| 1e-3 * one).collect() } else { vec![0.0; N] },
+                "velocity": rng.choice(["exact", "difference"]).unwrap(),
+                "delay": rng.u32(..4),
+            }),
+        ),
         17 => ("/arm_sim/set_friction", json!({"viscous": weights})),
         14 => return client.command_effort(json!(weights)).await,
         15 => return follow_path(client, &poses).await,

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 const WITHOUT_ROWS: &str = "name";
 
 /// Services that apply each field separately, with valid values that differ from the present ones.
-const FIELD_BY_FIELD: [(&str, &str); 9] = [
+const FIELD_BY_FIELD: [(&str, &str); 10] = [
     (
         "/arm_sim/set_integrator",
         r#"{"method":"euler","timestep":0.002}"#,
@@ -41,6 +41,10 @@ const FIELD_BY_FIELD: [(&str, &str); 9] = [
     (
         "/pid_controller/set_limits",
         r#"{"effort":[25.0,10.0],"anti_windup":"conditional","tracking_time":0.5}"#,
+    ),
+    (
+        "/pid_controller/set_sensors",
+        r#"{"encoder_step":[0.001,0.0],"velocity":"difference","delay":2}"#,
     ),
 ];
 

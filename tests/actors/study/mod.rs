@@ -56,7 +56,7 @@ fn settings<const N: usize>() -> Present<N> {
             timestep: 0.002,
             period: ControlPeriod {
                 period: 0.0,
-                delay: true,
+                delay: 1,
             },
             ..ControlLoop::free(Arm::default())
         },

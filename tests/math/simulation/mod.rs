@@ -29,7 +29,7 @@ fn a_period_is_the_nearest_number_of_steps_and_one_at_least() {
         (0.01, 3e-3, 3),
         (f64::MAX, f64::MIN_POSITIVE, 1 << 53),
     ] {
-        let delay = false;
+        let delay = 0;
         let period = ControlPeriod { period, delay };
         assert_eq!(period.steps(timestep), steps, "{period:?} of {timestep}");
         let length = steps as f64 * timestep;

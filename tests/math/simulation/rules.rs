@@ -1,8 +1,9 @@
 //! Inputs in any order: the efforts, the controller and the time follow the rules below, and nothing else changes.
 
-use pendularm::math::arm::Arm;
+use pendularm::math::arm::{Arm, State};
 use pendularm::math::limits::{AntiWindup, Limits};
 use pendularm::math::pid::{Gains, Pid, Setpoint};
+use pendularm::math::sensors::{Sensors, VelocitySource};
 use pendularm::math::simulation::{ArmInput, ControlPeriod, Simulation};
 use proptest::array::uniform2;
 use proptest::prelude::*;
@@ -16,8 +17,12 @@ struct Rules {
     /// Steps since the law ran; none if a period begins with the next step.
     held_for: Option<u64>,
     held: [f64; 2],
-    /// With a delay, the effort of the next period.
+    /// With a delay, the latest result, and those before it that wait.
     computed: [f64; 2],
+    waiting: Vec<[f64; 2]>,
+    sensors: Sensors<2>,
+    /// The latest measurement.
+    measured: Option<State<2>>,
     command: [f64; 2],
     driven: Option<[f64; 2]>,
     limits: Limits<2>,
@@ -41,9 +46,21 @@ fn limits() -> impl Strategy<Value = Limits<2>> {
     })
 }
 
+fn sensors() -> impl Strategy<Value = Sensors<2>> {
+    let encoder_step = prop_oneof![Just([0.0; 2]), uniform2(0.0..0.01_f64)];
+    let velocity = prop::sample::select(VelocitySource::ALL.to_vec());
+    (encoder_step, velocity).prop_map(|(encoder_step, velocity)| Sensors {
+        encoder_step,
+        velocity,
+    })
+}
+
 fn input() -> impl Strategy<Value = ArmInput<2>> {
     let effort = || uniform2(-20.0..20.0_f64);
-    let period = (prop_oneof![Just(0.01), 0.0..0.02], any::<bool>());
+    let period = (
+        prop_oneof![Just(0.01), 0.0..0.02],
+        prop_oneof![0..4_u8, 0..17_u8],
+    );
     let timestep = prop_oneof![Just(1e-3), Just(2e-3), 1e-4..3e-3];
     let gains = |part: f64| {
         let usual = Gains::<2>::default();
@@ -52,6 +69,7 @@ fn input() -> impl Strategy<Value = ArmInput<2>> {
     };
     prop_oneof![
         1 => Just(ArmInput::Reset),
+        1 => uniform2(-1.0..1.0).prop_map(|position| ArmInput::State(State::at_rest(position))),
         3 => any::<bool>().prop_map(ArmInput::Enabled),
         1 => timestep.prop_map(ArmInput::Timestep),
         1 => period.prop_map(|(period, delay)| ArmInput::Period(ControlPeriod { period, delay })),
@@ -60,6 +78,7 @@ fn input() -> impl Strategy<Value = ArmInput<2>> {
         1 => uniform2(-1.0..1.0).prop_map(|position| ArmInput::Setpoint(Setpoint::at(position))),
         2 => effort().prop_map(ArmInput::Command),
         1 => limits().prop_map(ArmInput::Limits),
+        1 => sensors().prop_map(ArmInput::Sensors),
         1 => (effort(), 1e-4..0.05)
             .prop_map(|(effort, duration)| ArmInput::Disturbance { effort, duration }),
     ]
@@ -74,6 +93,9 @@ impl Rules {
             held_for: None,
             held: [0.0; 2],
             computed: [0.0; 2],
+            waiting: vec![],
+            sensors: Sensors::default(),
+            measured: None,
             command: [0.0; 2],
             driven: None,
             limits: Limits::default(),
@@ -93,6 +115,25 @@ impl Rules {
     fn forget(&mut self) {
         [self.held, self.computed, self.command] = [[0.0; 2]; 3];
         (self.driven, self.held_for) = (None, None);
+        self.waiting.fill([0.0; 2]);
+        self.measured = None;
+    }
+
+    /// What the law measures now.
+    fn measure(&self, state: &State<2>, period: f64) -> State<2> {
+        let counted = |i: usize| match self.sensors.encoder_step[i] {
+            0.0 => state.position[i],
+            step => (state.position[i] / step).round() * step,
+        };
+        let position = [0, 1].map(counted);
+        let velocity = match (self.sensors.velocity, self.measured) {
+            (VelocitySource::Exact, _) => state.velocity,
+            (VelocitySource::Difference, None) => [0.0; 2],
+            (VelocitySource::Difference, Some(before)) => {
+                [0, 1].map(|i| (position[i] - before.position[i]) / period)
+            }
+        };
+        State { position, velocity }
     }
 
     /// The input. One that is active already changes nothing.
@@ -114,11 +155,22 @@ impl Rules {
             ArmInput::Timestep(timestep) if timestep != self.timestep => {
                 (self.base, self.since_base) = (self.time(), 0);
                 (self.timestep, self.held_for) = (timestep, None);
+                self.measured = None;
             }
             ArmInput::Period(period) if period != self.period => {
+                if period.delay != self.period.delay {
+                    let count = usize::from(period.delay).saturating_sub(1);
+                    self.waiting = vec![self.computed; count];
+                }
                 (self.period, self.held_for) = (period, None);
+                self.measured = None;
             }
-            ArmInput::Drive(effort) => (self.driven, self.held_for) = (effort, None),
+            ArmInput::Drive(effort) => {
+                (self.driven, self.held_for) = (effort, None);
+                self.measured = None;
+            }
+            ArmInput::Sensors(sensors) => (self.sensors, self.measured) = (sensors, None),
+            ArmInput::State(_) => self.measured = None,
             ArmInput::Gains(gains) => {
                 self.law.set_gains(gains);
                 assert_eq!(*self.law.gains(), gains);
@@ -148,11 +200,15 @@ impl Rules {
             let length = self.period.steps(self.timestep);
             if self.held_for.is_none_or(|steps| steps == length) {
                 let dt = self.period.effective(self.timestep);
-                let control = self.limits.control(&self.law, simulation.state(), dt);
+                let measured = self.measure(simulation.state(), dt);
+                self.measured = Some(measured);
+                let control = self.limits.control(&self.law, &measured, dt);
                 self.law.commit(control.integral);
                 self.held = control.effort;
-                if self.period.delay {
-                    std::mem::swap(&mut self.held, &mut self.computed);
+                if self.period.delay > 0 {
+                    self.waiting.push(self.computed);
+                    self.computed = self.held;
+                    self.held = self.waiting.remove(0);
                 }
                 self.held_for = Some(0);
             }
@@ -176,6 +232,7 @@ impl Rules {
         assert_eq!(*simulation.command(), self.command);
         assert_eq!(simulation.control_period(), self.period);
         assert_eq!(*simulation.limits(), self.limits);
+        assert_eq!(*simulation.sensors(), self.sensors);
         assert_eq!(simulation.time(), self.time());
         assert_eq!(simulation.steps(), self.steps);
         let mut next = self.clone();

@@ -73,7 +73,7 @@ fn a_settling_loop_does_not_diverge_at_the_advised_timestep<const N: usize>(
     let method = Method::ALL[dice.0.usize(0..Method::ALL.len())];
     let mut control = ControlLoop::new(arm, no_control(), setpoint).with_method(method);
     control.gains = gains(&mut dice, &control);
-    control.period.delay = dice.one_in(5);
+    control.period.delay = dice.one_in(5).into();
     let start = start(&mut dice, &setpoint.position);
     let timestep = advised(&control, &start);
     if timestep == 0.0 {

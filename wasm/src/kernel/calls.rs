@@ -9,7 +9,7 @@ use pendularm::protocol::op::{Arguments, CallService};
 use pendularm::protocol::wire::json::Payload;
 use pendularm::services::arm::{
     Disturb, Enable, Pause, Reset, SetFriction, SetGains, SetIntegrator, SetLimits, SetParams,
-    SetPeriod, SetState, Step,
+    SetPeriod, SetSensors, SetState, Step,
 };
 use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
 use pendularm::services::study::{
@@ -49,6 +49,7 @@ impl<const N: usize> Kernel<N> {
             Service::Disturb => self.of_arm::<Disturb<N>>(own, &args, &to),
             Service::SetGains => self.of_arm::<SetGains<N>>(own, &args, &to),
             Service::SetLimits => self.of_arm::<SetLimits<N>>(own, &args, &to),
+            Service::SetSensors => self.of_arm::<SetSensors<N>>(own, &args, &to),
             Service::SetPeriod => self.of_arm::<SetPeriod>(own, &args, &to),
             Service::Enable => self.of_arm::<Enable>(own, &args, &to),
             Service::Step => self.answer::<Step<N>>(own, &args, &to, Self::step),

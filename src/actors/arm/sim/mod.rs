@@ -25,8 +25,8 @@ pub use crate::live::{
 };
 pub use crate::services::arm::{
     Disturb, Enable, Integrator, MAX_STEPS, Pause, PeriodInForce, Push, Reset, STEPS_IN_A_ROW,
-    SetFriction, SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod, SetState, Step, Stepped,
-    StepsEnd, joint_names,
+    SensorsInForce, SetFriction, SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod,
+    SetSensors, SetState, Step, Stepped, StepsEnd, joint_names,
 };
 pub use crate::services::study::Present;
 pub use crate::services::{Echo, FieldByField};

@@ -15,7 +15,7 @@ use crate::live::ArmRequest;
 use crate::protocol::catalog::{Node, Rosapi, Service, Topic};
 use crate::services::arm::{
     AskParameters, Disturb, Enable, GetTime, Pause, Reset, SetFriction, SetGains, SetIntegrator,
-    SetLimits, SetParams, SetPeriod, SetState, Step, parameter_services,
+    SetLimits, SetParams, SetPeriod, SetSensors, SetState, Step, parameter_services,
 };
 use crate::services::goals::Solve;
 
@@ -29,6 +29,7 @@ impl<const N: usize> ArmSim<N> {
         nodes.serve::<SetIntegrator>(Service::SetIntegrator, address.clone());
         nodes.serve::<SetParams<N>>(Service::SetParams, address.clone());
         nodes.serve::<SetLimits<N>>(Service::SetLimits, address.clone());
+        nodes.serve::<SetSensors<N>>(Service::SetSensors, address.clone());
         nodes.serve::<SetPeriod>(Service::SetPeriod, address.clone());
         nodes.serve::<Reset<N>>(Service::Reset, address.clone());
         nodes.serve::<SetState<N>>(Service::SetState, address.clone());

@@ -6,7 +6,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::count::partition_point;
 use crate::math::integrator::Method;
 use crate::math::simulation::increments::leaves_out_first_angle;
-use crate::math::simulation::{Held, Simulation};
+use crate::math::simulation::{After, Simulation};
 
 /// The kind of a step, the same in all lanes of a register.
 #[derive(Debug, Clone, Copy)]
@@ -88,9 +88,8 @@ pub(super) struct BatchJob<'a, const N: usize> {
 /// A control period, or the rest of one, in which the effort is held.
 struct HeldSteps<const N: usize> {
     effort: [f64; N],
-    /// The arm's effort before it, and after the first step.
-    before: Held<N>,
-    after_one: Held<N>,
+    /// What is held after its first step.
+    after_one: After<N>,
     /// Steps that have been taken.
     taken: u64,
     /// The integral before it \[rad s\].
@@ -135,7 +134,7 @@ impl<'a, const N: usize> BatchJob<'a, N> {
         integral: impl FnOnce() -> [f64; N],
     ) -> [f64; N] {
         if let Some(period) = self.period.take() {
-            self.arm.hold.held = period.held();
+            period.commit(self.arm);
             self.arm.pid.commit(integral());
         }
         let before = *self.arm.pid.integral();
@@ -146,7 +145,6 @@ impl<'a, const N: usize> BatchJob<'a, N> {
         let (control, after_one) = hold.begin_step(pid, state);
         self.period = Some(HeldSteps {
             effort: control.effort,
-            before: hold.held,
             after_one,
             taken: 0,
             integral: before,
@@ -197,7 +195,7 @@ impl<'a, const N: usize> BatchJob<'a, N> {
         self.arm.steps += self.taken;
         self.arm.steps_since_base += self.taken;
         if let Some(period) = &self.period {
-            self.arm.hold.held = period.held();
+            period.commit(self.arm);
             if period.taken == 0 {
                 self.arm.pid.commit(period.integral);
             }
@@ -215,21 +213,20 @@ impl<const N: usize> HeldSteps<N> {
     /// The remaining steps.
     fn left(&self) -> u64 {
         if self.ends {
-            self.after_one.due + 1 - self.taken
+            self.after_one.held.due + 1 - self.taken
         } else {
             u64::MAX
         }
     }
 
-    /// The arm's present effort.
-    fn held(&self) -> Held<N> {
-        match self.taken.checked_sub(1) {
-            None => self.before,
-            Some(_) if !self.ends => self.after_one,
-            Some(more) => Held {
-                due: self.after_one.due - more,
-                ..self.after_one
-            },
+    /// Commits the taken steps to the arm.
+    fn commit(&self, arm: &mut Simulation<N>) {
+        let Some(more) = self.taken.checked_sub(1) else {
+            return;
+        };
+        arm.hold.commit(self.after_one);
+        if self.ends {
+            arm.hold.held.due -= more;
         }
     }
 }

@@ -274,9 +274,9 @@ fn slow_control() -> Observation {
     let (mut predicted, mut measured) = (Vec::new(), Vec::new());
     for method in [Method::Midpoint, Method::Verlet, Method::Rk4] {
         let control = held(MODERATE, POSE).with_method(method);
-        measured.extend([1, 10].map(|steps| LimitPair::of_period(&control, steps, false)));
+        measured.extend([1, 10].map(|steps| LimitPair::of_period(&control, steps, 0)));
         let linear = Linear::at_setpoint(&control);
-        predicted.push(Stepping::held(&linear, method, 100, false).limit());
+        predicted.push(Stepping::held(&linear, method, 100, 0).limit());
     }
     predicted.extend(measured.iter().map(|pair| pair.predicted));
     let predicted = predicted.into_iter().map(|limit| limit.unwrap_or(f64::NAN));
@@ -295,9 +295,9 @@ fn held_push() -> Observation {
         ..held(gains(1000.0, 0.0, [5.0, 2.0]), POSE)
     };
     let linear = Linear::at_setpoint(&control);
-    let limit = Stepping::held(&linear, Method::Rk4, 100, false).limit();
+    let limit = Stepping::held(&linear, Method::Rk4, 100, 0).limit();
     let grows = |period, substeps| {
-        let control = in_substeps(&control.with_timestep(period), substeps, false);
+        let control = in_substeps(&control.with_timestep(period), substeps, 0);
         growth(&control, Sampling::Held).is_none_or(|growth| growth > 1.0)
     };
     let (slow, fast) = (grows(0.02, 100), grows(2e-4, 1));
@@ -312,8 +312,8 @@ fn held_push() -> Observation {
 
 fn late_control() -> Observation {
     let control = held(MODERATE, POSE);
-    let prompt = Stepping::held(&Linear::at_setpoint(&control), Method::Rk4, 1, false).limit();
-    let late = LimitPair::of_period(&control, 1, true);
+    let prompt = Stepping::held(&Linear::at_setpoint(&control), Method::Rk4, 1, 0).limit();
+    let late = LimitPair::of_period(&control, 1, 1);
     let is_less = late.predicted.zip(prompt);
     let is_less = is_less.is_some_and(|(late, prompt)| late < 0.5 * prompt);
     let words = format!("{late}; without delay {} s", short(prompt));
