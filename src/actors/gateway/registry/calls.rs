@@ -35,7 +35,6 @@ const READ_SOCKETS: Duration = Duration::from_millis(50);
 
 /// A call or a goal for the client that serves it.
 pub(super) struct ToForward<'a> {
-    /// Whether it is a call or a goal.
     pub(super) kind: Served,
     /// The name, as the caller spells it.
     pub(super) name: &'a str,
@@ -344,6 +343,10 @@ impl Registry {
 
     // ---- the end of requests without an answer ----------------------------------------------------------------------
 
+    pub(super) fn start_cleanup(ctx: &mut Context<Self>) {
+        ctx.spawn(Cleanup::default());
+    }
+
     /// Ends one batch: first calls past their deadlines, then requests of disconnected providers.
     fn clean_up_batch(&mut self) {
         let now = Instant::now();
@@ -369,7 +372,7 @@ impl Registry {
 
 /// Ends calls past their deadlines, and requests of disconnected providers. The actor polls it after each message.
 #[derive(Default)]
-pub(super) struct Cleanup {
+struct Cleanup {
     timer: Timer,
     /// Calls end from this time on, after the process was stopped beyond a deadline.
     sockets_read: Option<Instant>,

@@ -21,7 +21,6 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use self::calls::Cleanup;
 pub use self::clients::{Connect, CountRefusal, Disconnect, HeldPlace, Retire};
 use crate::actors::ConnectionId;
 use crate::actors::graph::forwarded::ForwardedRequests;
@@ -128,7 +127,7 @@ impl Actor for Registry {
     type Context = Context<Self>;
 
     fn started(&mut self, ctx: &mut Context<Self>) {
-        ctx.spawn(Cleanup::default());
+        Self::start_cleanup(ctx);
     }
 }
 
