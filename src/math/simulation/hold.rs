@@ -96,12 +96,15 @@ impl<const N: usize> Default for Memory<N> {
     }
 }
 
-/// What is held after a step, and remembered.
+/// What a step changes, once it is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct After<const N: usize> {
-    pub(in crate::math) held: Held<N>,
-    /// What the law has measured, if it ran and there is a [`Memory`].
-    measured: Option<State<N>>,
+    /// Steps until the law runs again.
+    pub(super) due: u64,
+    /// The controller's effort in this step \[N m\].
+    effort: [f64; N],
+    /// If the law ran: what it measured, and its result \[N m\].
+    ran: Option<(State<N>, [f64; N])>,
 }
 
 /// The held effort, with values computed from it and the timestep.
@@ -111,8 +114,9 @@ pub struct Hold<const N: usize> {
     /// What the motors can apply. It holds for every effort here.
     pub(in crate::math) limits: Limits<N>,
     pub(in crate::math) sensors: Sensors<N>,
-    /// Only for sensors that are not exact, and a delay of several periods.
-    memory: Option<Box<Memory<N>>>,
+    memory: Memory<N>,
+    /// Whether the memory is used: for sensors that are not exact, and a delay of several periods.
+    remembers: bool,
     /// Steps per period.
     steps: u64,
     /// Duration of a period \[s\].
@@ -145,13 +149,18 @@ impl<const N: usize> Hold<N> {
             held,
             limits,
             sensors,
-            memory: remembers.then(|| Box::new(memory)),
+            memory: if remembers {
+                memory
+            } else {
+                Memory::default()
+            },
+            remembers,
         }
     }
 
     /// What is remembered between two runs of the law.
     pub(super) fn memory(&self) -> Memory<N> {
-        self.memory.as_deref().copied().unwrap_or_default()
+        self.memory
     }
 
     /// The same effort with other values.
@@ -188,9 +197,7 @@ impl<const N: usize> Hold<N> {
 
     /// The arm is in another state, so a difference to the old one is no velocity.
     pub(super) fn forget_measurement(&mut self) {
-        if let Some(memory) = &mut self.memory {
-            memory.measured = None;
-        }
+        self.memory.measured = None;
     }
 
     /// Sets the clients' effort \[N m\].
@@ -212,43 +219,41 @@ impl<const N: usize> Hold<N> {
     /// The control for the step that begins now, from `state`, and the held values after it. The law runs if it is due.
     #[must_use]
     pub fn begin_step(&self, pid: &Pid<N>, state: &State<N>) -> (Control<N>, After<N>) {
-        let mut held = self.held;
+        let held = &self.held;
         let mut integral = *pid.integral();
-        let mut measured = None;
+        let mut after = After {
+            due: held.due,
+            effort: held.effort,
+            ran: None,
+        };
         let effort = match held.driven {
             Some(effort) => effort,
             None if !pid.is_enabled() => held.command,
             None => {
                 if held.due == 0 {
-                    measured = self.memory.as_ref().map(|memory| {
-                        let before = memory.measured.as_ref();
-                        self.sensors.measured(state, before, self.length)
-                    });
-                    let state = measured.as_ref().unwrap_or(state);
-                    let control = self.limits.control(pid, state, self.length);
-                    held.effort = if held.period.delay > 0 {
-                        let oldest = std::mem::replace(&mut held.computed, control.effort);
-                        match &self.memory {
-                            Some(memory) if held.period.delay > 1 => memory.waiting[0],
-                            _ => oldest,
-                        }
-                    } else {
-                        control.effort
+                    let before = self.memory.measured.as_ref();
+                    let seen = self.sensors.measured(state, before, self.length);
+                    let control = self.limits.control(pid, &seen, self.length);
+                    after.effort = match held.period.delay {
+                        0 => control.effort,
+                        1 => held.computed,
+                        _ => self.memory.waiting[0],
                     };
+                    after.ran = Some((seen, control.effort));
+                    after.due = self.steps;
                     integral = control.integral;
-                    held.due = self.steps;
                 }
-                held.due -= 1;
-                held.effort
+                after.due -= 1;
+                after.effort
             }
         };
         let effort = self.limits.applied(effort);
-        (Control { effort, integral }, After { held, measured })
+        (Control { effort, integral }, after)
     }
 
     /// What the law measured in its latest run, or what it would measure in its first one.
     pub(super) fn measured(&self, state: &State<N>) -> State<N> {
-        let latest = self.memory.as_ref().and_then(|memory| memory.measured);
+        let latest = self.memory.measured;
         latest.unwrap_or_else(|| self.sensors.measured(state, None, self.length))
     }
 
@@ -265,15 +270,23 @@ impl<const N: usize> Hold<N> {
 
     /// Commits a step: its effort is held from now on.
     pub fn commit(&mut self, after: After<N>) {
-        if let (Some(memory), Some(measured)) = (&mut self.memory, after.measured) {
-            memory.measured = Some(measured);
+        let held = &mut self.held;
+        held.due = after.due;
+        held.effort = after.effort;
+        let Some((seen, result)) = after.ran else {
+            return;
+        };
+        if self.remembers {
+            self.memory.measured = Some(seen);
             // The result before this one waits in its turn.
-            let last = usize::from(self.held.period.delay).saturating_sub(2);
-            memory.waiting.copy_within(1.., 0);
-            if let Some(place) = memory.waiting.get_mut(last) {
-                *place = self.held.computed;
+            let last = usize::from(held.period.delay).saturating_sub(2);
+            self.memory.waiting.copy_within(1.., 0);
+            if let Some(place) = self.memory.waiting.get_mut(last) {
+                *place = held.computed;
             }
         }
-        self.held = after.held;
+        if held.period.delay > 0 {
+            held.computed = result;
+        }
     }
 }

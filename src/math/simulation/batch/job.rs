@@ -88,8 +88,8 @@ pub(super) struct BatchJob<'a, const N: usize> {
 /// A control period, or the rest of one, in which the effort is held.
 struct HeldSteps<const N: usize> {
     effort: [f64; N],
-    /// What is held after its first step.
-    after_one: After<N>,
+    /// What its first step changes.
+    first: After<N>,
     /// Steps that have been taken.
     taken: u64,
     /// The integral before it \[rad s\].
@@ -142,10 +142,10 @@ impl<'a, const N: usize> BatchJob<'a, N> {
             return before;
         }
         let (hold, pid) = (&self.arm.hold, &self.arm.pid);
-        let (control, after_one) = hold.begin_step(pid, state);
+        let (control, first) = hold.begin_step(pid, state);
         self.period = Some(HeldSteps {
             effort: control.effort,
-            after_one,
+            first,
             taken: 0,
             integral: before,
             ends: pid.is_enabled() && hold.held.driven.is_none(),
@@ -213,7 +213,7 @@ impl<const N: usize> HeldSteps<N> {
     /// The remaining steps.
     fn left(&self) -> u64 {
         if self.ends {
-            self.after_one.held.due + 1 - self.taken
+            self.first.due + 1 - self.taken
         } else {
             u64::MAX
         }
@@ -224,10 +224,11 @@ impl<const N: usize> HeldSteps<N> {
         let Some(more) = self.taken.checked_sub(1) else {
             return;
         };
-        arm.hold.commit(self.after_one);
+        let mut step = self.first;
         if self.ends {
-            arm.hold.held.due -= more;
+            step.due -= more;
         }
+        arm.hold.commit(step);
     }
 }
 
