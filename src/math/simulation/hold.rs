@@ -269,6 +269,7 @@ impl<const N: usize> Hold<N> {
     }
 
     /// Commits a step: its effort is held from now on.
+    #[cold]
     pub fn commit(&mut self, after: After<N>) {
         let held = &mut self.held;
         held.due = after.due;

@@ -228,9 +228,7 @@ impl<const N: usize> Simulation<N> {
     #[inline]
     fn take_step<const HAS_GRAVITY: bool, const HAS_FRICTION: bool>(&mut self) -> bool {
         let mut held = None;
-        let mut control = if !self.hold.every_step {
-            self.begin_held_step(&mut held)
-        } else if self.pid.is_enabled() {
+        let mut control = if self.pid.is_enabled() {
             self.pid.control(&self.state, self.timestep)
         } else {
             Control {
@@ -238,6 +236,9 @@ impl<const N: usize> Simulation<N> {
                 integral: *self.pid.integral(),
             }
         };
+        if !self.hold.every_step {
+            self.begin_held_step(&mut held, &mut control);
+        }
         if self.disturbance.is_some() {
             self.add_disturbance(&mut control.effort);
         }
@@ -285,11 +286,12 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// The control of a step whose period has several steps.
+    #[cold]
     #[inline(never)]
-    fn begin_held_step(&self, after: &mut Option<After<N>>) -> Control<N> {
-        let (control, held) = self.hold.begin_step(&self.pid, &self.state);
+    fn begin_held_step(&self, after: &mut Option<After<N>>, control: &mut Control<N>) {
+        let (begun, held) = self.hold.begin_step(&self.pid, &self.state);
         *after = Some(held);
-        control
+        *control = begun;
     }
 
     /// Adds the disturbance to the effort of the step that begins now, or ends the disturbance if its time is over.
