@@ -149,11 +149,7 @@ impl<const N: usize> Hold<N> {
             held,
             limits,
             sensors,
-            memory: if remembers {
-                memory
-            } else {
-                Memory::default()
-            },
+            memory: if remembers { memory } else { Memory::default() },
             remembers,
         }
     }

@@ -285,7 +285,7 @@ impl<const N: usize> Simulation<N> {
         }
     }
 
-    /// The control of a step whose period has several steps.
+    /// The control of a step whose effort is not simply that of the law on the present state.
     #[cold]
     #[inline(never)]
     fn begin_held_step(&self, after: &mut Option<After<N>>, control: &mut Control<N>) {
