@@ -4,18 +4,9 @@
 
 use super::Outbox;
 use super::message::Waiting;
-use crate::protocol::limits::{MEDIUM, SHORT};
+use crate::protocol::limits::SHORT;
 
 impl Outbox {
-    /// Whether a long topic message waits or is being written. Messages that are held back do not count.
-    #[must_use]
-    pub fn has_long(&self) -> bool {
-        let mut waiting = self.topics.iter();
-        let mut writing = self.writing.iter();
-        waiting.any(|message| message.frame.len() > MEDIUM)
-            || writing.any(|frame| frame.length > MEDIUM && !frame.is_response)
-    }
-
     /// Bytes of waiting responses, including those being written.
     #[must_use]
     pub const fn response_bytes(&self) -> usize {

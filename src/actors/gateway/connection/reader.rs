@@ -24,7 +24,6 @@ use crate::actors::gateway::registry::{Handled, Request, Retire};
 use crate::actors::resources::long_work::SHORT_WORK;
 use crate::actors::resources::memory::{Permit, time_to_read};
 use crate::actors::resources::turns::{Timer, end_turn};
-use crate::actors::resources::unread::unless_closed;
 use crate::protocol::catalog::Service;
 use crate::protocol::limits::{MAX_FRAME, SHORT};
 use crate::protocol::op::{self, CallService, Compression, Incoming, Op, Problem, Subscribe};
@@ -323,11 +322,7 @@ impl ClientReader {
         if !may_wait {
             return ReadStep::Performing(Box::pin(effect));
         }
-        ReadStep::Performing(Box::pin(unless_closed(
-            effect,
-            client.gone.clone(),
-            client.ends,
-        )))
+        ReadStep::Performing(Box::pin(client.gone.clone().unless_closed(effect)))
     }
 }
 
