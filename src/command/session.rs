@@ -23,9 +23,10 @@ use crate::output::print_error;
 use crate::protocol::catalog::rosapi::PREFIX;
 use crate::protocol::names::{are_same, same_type};
 use crate::protocol::op::token::Token;
+use crate::protocol::wire::text::excerpt;
 use crate::value::{ValueReader, needed, within};
 
-/// Longest time for connecting.
+/// Longest time for connecting, and then for the first answer, which the runtime gives at once.
 const CONNECT: Duration = Duration::from_secs(5);
 /// Without `--timeout`: longer than any command runs.
 const NO_LIMIT: Duration = Duration::from_secs(100 * 365 * 24 * 60 * 60);
@@ -75,6 +76,8 @@ pub(super) struct Session {
     patience: Duration,
     /// Deadline of the next awaited frame.
     deadline: Instant,
+    /// Deadline of the first frame; `None` once it has arrived.
+    first_due: Option<Instant>,
     /// Whether JSON is printed.
     pub(super) is_json: bool,
 }
@@ -141,6 +144,7 @@ impl RuntimeOptions {
             calls: 0,
             patience,
             deadline: Instant::now(),
+            first_due: Some(Instant::now() + CONNECT),
             is_json: self.json,
         };
         let opening = match &self.token {
@@ -180,12 +184,22 @@ impl Session {
             let room = (MAX_ANSWER + 1).saturating_sub(self.line.len());
             let mut bounded = (&mut self.stream).take(room as u64);
             let read = bounded.read_until(b'\n', &mut self.line);
-            let Ok(read) = timeout_at(self.deadline, read).await else {
+            let due = self
+                .first_due
+                .map_or(self.deadline, |due| due.min(self.deadline));
+            let Ok(read) = timeout_at(due, read).await else {
+                if self.first_due.is_some() && (due < self.deadline || !self.line.is_empty()) {
+                    self.know_server()?;
+                    continue;
+                }
                 let seconds = self.patience.as_secs_f64();
                 let why = format!("no answer or message within {seconds} s");
                 return Err(CommandError::Lost(why));
             };
             read.map_err(CommandError::lost)?;
+            if !self.line.is_empty() {
+                self.know_server()?;
+            }
             let line = std::mem::take(&mut self.line);
             if !line.ends_with(b"\n") {
                 return Err(CommandError::lost(match line.len() {
@@ -205,6 +219,25 @@ impl Session {
                 _ => {}
             }
         }
+    }
+
+    /// Checks the first bytes of the server: an object has begun.
+    fn know_server(&mut self) -> Outcome {
+        let Some(first) = self.first_due.take().map(|_| self.line.trim_ascii_start()) else {
+            return Ok(());
+        };
+        let found = match first {
+            [b'{', ..] => return Ok(()),
+            [] if self.line.is_empty() => format!("it is silent for {} s", CONNECT.as_secs()),
+            [0x15 | 0x16, 3, ..] => "it answers in TLS".to_owned(),
+            other => format!(
+                "it answers \"{}\"",
+                excerpt(String::from_utf8_lossy(other).trim_end())
+            ),
+        };
+        Err(CommandError::Lost(format!(
+            "this is no rosbridge server: {found}; name the runtime's address with --connect"
+        )))
     }
 
     /// Calls a service, and returns the values of its answer.

@@ -4,6 +4,7 @@
 
 use std::fs::{self, File};
 use std::io::Write;
+use std::net::TcpStream;
 use std::process::Stdio;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -145,6 +146,33 @@ fn clients_are_served_even_if_standard_output_fails() {
         }
         runtime.end();
         drop(reader);
+    }
+}
+
+/// A request waits for its turn unread and unwritten, so only the system knows that its client has left.
+#[cfg(target_os = "linux")]
+#[test]
+fn nothing_is_stepped_for_clients_that_left_before_a_reset_that_was_answered() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.call("/arm_sim/pause", json!({"data": true}));
+    for (calls, steps) in [(200, 500), (1, 1_000_000), (2, 2500), (200, 1), (40, 999)] {
+        let call =
+            json!({"op": "call_service", "service": "/arm_sim/step", "args": {"steps": steps}});
+        let frames = format!("{call}\n").repeat(calls);
+        let leave = |_| {
+            let mut stream = TcpStream::connect(runtime.address).unwrap();
+            stream.write_all(frames.as_bytes()).unwrap();
+            stream
+        };
+        drop((0..8).map(leave).collect::<Vec<_>>());
+        client.call("/arm_sim/reset", json!({}));
+        for step in 1..=30 {
+            let stepped = client.call("/arm_sim/step", json!({"steps": 1}));
+            let time = stepped["values"]["time"].as_f64().unwrap();
+            assert_eq!((time * 1e3).round(), f64::from(step), "{calls} of {steps}");
+            thread::sleep(Duration::from_millis(2));
+        }
     }
 }
 

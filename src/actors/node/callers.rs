@@ -174,6 +174,10 @@ impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
         self.caller.is_gone()
     }
 
+    fn has_left(&self) -> bool {
+        self.caller.link.gone.look()
+    }
+
     fn warn(&self, why: &str) {
         let id = self.caller.id();
         self.caller.link.status(Level::Warning, why, id);

@@ -57,6 +57,11 @@ pub trait Asker<T>: Send {
         false
     }
 
+    /// The same, and asks the system, which takes some microseconds.
+    fn has_left(&self) -> bool {
+        self.is_gone()
+    }
+
     /// Sends, before the answer, the reason why the request has no effect yet. For a node this is in the answer.
     fn warn(&self, _why: &str) {}
 
@@ -93,6 +98,12 @@ impl<T> Reply<T> {
     #[must_use]
     pub fn caller_is_gone(&self) -> bool {
         self.asker.as_ref().is_some_and(|asker| asker.is_gone())
+    }
+
+    /// The same, and asks the system, which takes some microseconds.
+    #[must_use]
+    pub fn caller_has_left(&self) -> bool {
+        self.asker.as_ref().is_some_and(|asker| asker.has_left())
     }
 
     /// Waits for memory for an answer of at most `bytes` bytes, before it is computed. Short answers need none. Refuses

@@ -10,8 +10,6 @@ use std::time::Duration;
 
 use tokio::time::sleep;
 
-use super::gone::Gone;
-
 #[cfg(target_os = "linux")]
 use self::sockets::value;
 
@@ -67,21 +65,17 @@ fn unread(ends: Ends) -> Option<usize> {
     Some((received + value(ends.local, ends.peer, SENT)?) as usize)
 }
 
-/// Ends when the client has closed its socket, if it is on this machine: the socket belongs to no program any more. A
-/// client that has only stopped sending may still read. For a client on another machine it never ends.
-pub async fn closed(ends: Ends) {
-    while value(ends.peer, ends.local, INODE) != Some(0) {
-        sleep(CLOSED_CHECK).await;
-    }
+/// Whether the client has closed its socket, if it is on this machine: the socket belongs to no program any more. A
+/// client that has only stopped sending may still read. For a client on another machine it is false.
+#[must_use]
+pub fn is_closed(ends: Ends) -> bool {
+    value(ends.peer, ends.local, INODE) == Some(0)
 }
 
-/// Waits until an op has taken effect that may wait for memory, since nothing is read meanwhile. If the client has closed
-/// its socket, the op is told, and its effect is not waited for.
-pub async fn unless_closed(effect: impl Future<Output = ()>, gone: Gone, ends: Ends) {
-    tokio::select! {
-        biased;
-        () = effect => {}
-        () = closed(ends) => gone.set(),
+/// Ends when the client has [closed](is_closed) its socket.
+pub async fn closed(ends: Ends) {
+    while !is_closed(ends) {
+        sleep(CLOSED_CHECK).await;
     }
 }
 

@@ -111,12 +111,6 @@ impl FlowControl {
         if self.age > MAX_AGE { FRESH } else { MAX_AGE }
     }
 
-    /// Age of the oldest unread byte at the last query.
-    #[must_use]
-    pub const fn age(&self) -> Duration {
-        self.age
-    }
-
     /// The time of the next query, if nothing may be written before it.
     #[must_use]
     pub fn next_query(&self) -> Option<Instant> {

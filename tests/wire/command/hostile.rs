@@ -4,7 +4,7 @@ use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::Command;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
@@ -103,6 +103,48 @@ fn a_server_that_closes_or_gives_no_answer_ends_a_command_with_status_3() {
         let (status, out, complaint) = start(&arguments, &address).end();
         assert_eq!((status, out.as_str()), (Some(3), ""), "{why}");
         assert!(complaint.contains(why), "{complaint}");
+    }
+}
+
+#[test]
+fn a_command_says_within_5_s_what_answers_instead_of_a_rosbridge_server() {
+    let found: [(&[u8], &str); 9] = [
+        (
+            b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\n",
+            "HTTP/1.1 400",
+        ),
+        (b"SSH-2.0-OpenSSH_9.2\r\n", "SSH-2.0"),
+        (b"SSH-2.0-", "SSH-2.0"),
+        (b"\x15\x03\x01\x00\x02\x02\x0a", "TLS"),
+        (b"\x16\x03\x03\x00\x7a\x02", "TLS"),
+        (b"220 mail ESMTP\r\n", "220 mail"),
+        (b"-ERR unknown command\r\n", "-ERR"),
+        (b"\r\n[1, 2]\n", "answers \"\""),
+        (b"", "silent for 5 s"),
+    ];
+    let commands = found.map(|(says, expected)| {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        thread::spawn(move || {
+            let (mut stream, _) = listener.accept().unwrap();
+            stream.write_all(says).unwrap();
+            hold(&mut stream);
+        });
+        (
+            Instant::now(),
+            start(&["topic", "list"], &address),
+            expected,
+        )
+    });
+    for (began, command, expected) in commands {
+        let (status, out, complaint) = command.end();
+        assert_eq!((status, out.as_str()), (Some(3), ""), "{expected}");
+        assert!(
+            complaint.contains("this is no rosbridge server"),
+            "{complaint}"
+        );
+        assert!(complaint.contains(expected), "{complaint}");
+        assert!(began.elapsed() < Duration::from_secs(9), "{expected}");
     }
 }
 

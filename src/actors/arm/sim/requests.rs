@@ -4,7 +4,7 @@
 //! other requests take effect in between.
 //!
 //! **Invariant:** the arm advances to now before it answers. A refused request for steps changes nothing. An accepted
-//! one is completed, unless the arm diverges, is resumed, or the runtime ends.
+//! one is completed, unless the arm diverges, is resumed, its client leaves, or the runtime ends.
 
 use actix::prelude::*;
 
@@ -126,8 +126,9 @@ impl<const N: usize> ArmSim<N> {
     }
 
     /// Takes the next row of steps. Answers after the last one, otherwise puts the request at the end of the queue.
+    /// Nothing is stepped for a client that has left, because another one may have reset the arm since.
     fn take_row(&mut self, mut steps: Steps<N>) {
-        if steps.reply.caller_is_gone() {
+        if steps.reply.caller_has_left() {
             return steps.reply.refuse(Unserved::CALLER_GONE);
         }
         let (stepped, progress) = self.arm.take_row(&mut steps.asked);

@@ -88,7 +88,7 @@ impl<S: ClientStream> Connection<S> {
             flow: FlowControl::new(unread, now.into_std()),
             is_single: false,
             backlog: Arc::default(),
-            gone: Gone::default(),
+            gone: Gone::of(ends),
             progress: now,
             responses_since: None,
             permitted: VecDeque::new(),

@@ -29,7 +29,7 @@ use crate::actors::node::Completion;
 use crate::actors::resources::long_work::SHORT_WORK;
 use crate::actors::resources::memory::{Permit, time_to_read};
 use crate::actors::resources::turns::{Timer, end_turn};
-use crate::actors::resources::unread::{closed, unless_closed};
+use crate::actors::resources::unread::closed;
 use crate::protocol::catalog::Service;
 use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
 use crate::protocol::op::{
@@ -341,11 +341,7 @@ impl ClientReader {
         if !may_wait {
             return ReadStep::Performing(Box::pin(completed));
         }
-        ReadStep::Performing(Box::pin(unless_closed(
-            completed,
-            client.gone.clone(),
-            client.ends,
-        )))
+        ReadStep::Performing(Box::pin(client.gone.clone().unless_closed(completed)))
     }
 
     // ---- waits and their deadlines ----------------------------------------------------------------------------------
