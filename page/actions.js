@@ -4,7 +4,7 @@
 
 import { announce, byId, passFocus, warn } from "./dom.js";
 import { inPageNames } from "./format.js";
-import { enable, pause, reset, sendSetpoint, setFriction, setGains, setIntegrator, setMotors, setParams, setPeriod, setState } from "./runtime.js";
+import { enable, pause, reset, sendSetpoint, setFriction, setGains, setIntegrator, setMotors, setParams, setPeriod, setSensors, setState } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
 import { state, tell, watch } from "./store.js";
 
@@ -33,7 +33,7 @@ export function startActions() {
     undo.past.length = 0;
     showUndo();
   });
-  watch(["connection", "integrator", "params", "gains", "period", "friction", "motors", "enabled", "setpoint"], showUndo);
+  watch(["connection", "integrator", "params", "gains", "period", "friction", "motors", "sensors", "enabled", "setpoint"], showUndo);
 }
 
 /** Announces the refusals, or that there are none. @param {string} refused @param {string} done */
@@ -52,7 +52,7 @@ export async function takeBack() {
 
 /** Applies the given settings, and returns the text of all refusals. The controller is last, so it never acts with half of the settings. */
 export async function apply(/** @type {import("./settings.js").Settings} */ settings) {
-  const { integrator, params, gains, period, friction, motors, controller, setpoint, start } = settings;
+  const { integrator, params, gains, period, friction, motors, sensors, controller, setpoint, start } = settings;
   applying = true;
   tell("anew");
   const answers = [];
@@ -63,6 +63,7 @@ export async function apply(/** @type {import("./settings.js").Settings} */ sett
   if (period) answers.push(await setPeriod(period));
   if (friction && state.friction) answers.push(await setFriction(friction));
   if (motors && state.motors) answers.push(await setMotors(motors));
+  if (sensors && state.sensors) answers.push(await setSensors(sensors));
   if (setpoint) answers.push(setSetpoint(setpoint));
   if (start) answers.push(await setState(start.position ?? new Array(state.links).fill(0), start.velocity));
   if (controller != null && controller !== false) answers.push(await enable(controller));
@@ -93,7 +94,7 @@ export async function setScene({ controller, setpoint, ...rest }, paused) {
   const early = await apply({ ...rest, controller: null, setpoint: null });
   const answer = await reset();
   // A reset changes the setpoint to the starting pose, so the setpoint is sent after it.
-  const late = await apply({ integrator: null, params: null, gains: null, period: null, friction: null, motors: null, controller, setpoint });
+  const late = await apply({ integrator: null, params: null, gains: null, period: null, friction: null, motors: null, sensors: null, controller, setpoint });
   if (state.paused !== paused) await pause(paused);
   return [early, late, textOf([answer])].filter(Boolean).join("; ");
 }

@@ -4,6 +4,7 @@
 /** @typedef {{gravity: number, masses: number[], lengths: number[]}} Arm */
 /** @typedef {{kp: number[], ki: number[], kd: number[]}} Gains */
 /** @typedef {{effort: number[] | null, anti_windup: string, tracking_time: number}} Motors limits of the efforts [N m], and the anti-windup */
+/** @typedef {{encoder_step: number[], velocity: string, delay: number}} Sensors what the controller measures [rad], and its delay [periods] */
 /**
  * What the page knows of the live arm.
  * @typedef {object} Live
@@ -12,6 +13,7 @@
  * @property {Gains | null} gains
  * @property {{method: string, timestep: number} | null} integrator
  * @property {Motors | null} [motors] @property {{viscous: number[]} | null} [friction]
+ * @property {Sensors | null} [sensors]
  * @property {{period: number, delay: boolean, effective_period?: number} | null} period
  * @property {boolean | null} enabled whether the controller is on
  * @property {Float64Array} setpoint @property {boolean} setpointKnown
@@ -24,6 +26,7 @@
  * @property {number[]} setpoint [rad]
  * @property {number} control_period [s]; 0 for every step
  * @property {boolean} delay whether a torque acts one period late
+ * @property {Sensors} [sensors] their delay counts instead
  * @property {Motors} [limits] of the motors
  * @property {number[]} [viscous] friction of each joint [N m s/rad]
  * @property {number[]} q @property {number[]} qd pose and velocity at the start [rad, rad/s]
@@ -46,12 +49,13 @@ export function noGains(n) {
  * is off are no part of it.
  * @param {Live} live @returns {Question | null}
  */
-export function questionOf({ links, params, gains, integrator, period, friction, motors, enabled, setpoint, setpointKnown, position, velocity }) {
+export function questionOf({ links, params, gains, integrator, period, friction, motors, sensors, enabled, setpoint, setpointKnown, position, velocity }) {
   if (!params || !gains || !integrator || !period || enabled === null || enabled === undefined) return null;
   if (gains.kp.length !== links || params.masses.length !== links || (enabled && !setpointKnown)) return null;
   const list = (/** @type {Float64Array} */ values) => Array.from(values.subarray(0, links));
+  const real = { ...(motors ? { limits: motors } : {}), ...(sensors ? { sensors } : {}) };
   const loop = enabled
-    ? { gains, setpoint: list(setpoint), control_period: period.period, delay: period.delay, ...(motors ? { limits: motors } : {}) }
+    ? { gains, setpoint: list(setpoint), control_period: period.period, delay: period.delay, ...real }
     : { gains: noGains(links), setpoint: new Array(links).fill(0), control_period: 0, delay: false };
   const viscous = friction ? { viscous: friction.viscous } : {};
   return { params, ...viscous, ...loop, q: list(position), qd: list(velocity), integrator: integrator.method, timestep: integrator.timestep };

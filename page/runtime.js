@@ -228,6 +228,7 @@ function poll() {
   setPeriod({});
   setFriction({});
   setMotors({});
+  setSensors({});
   pause();
   const last = enable();
   askStability();
@@ -256,9 +257,19 @@ function keep(key, value) {
 export const setParams = (args) => settings("/arm_sim/set_params", args, (values) => keep("params", values));
 export const setIntegrator = (args) => settings("/arm_sim/set_integrator", args, (values) => keep("integrator", values));
 export const setGains = (args) => settings("/pid_controller/set_gains", args, (values) => keep("gains", values));
-export const setPeriod = (args) => settings("/pid_controller/set_period", args, (values) => keep("period", values));
 export const setFriction = (args) => settings("/arm_sim/set_friction", args, (values) => keep("friction", values));
 export const setMotors = (args) => settings("/pid_controller/set_limits", args, (values) => keep("motors", values));
+/** The delay is a value of two settings, so a change of one asks for the other. */
+export async function setPeriod(args) {
+  const answer = await settings("/pid_controller/set_period", args, (values) => keep("period", values));
+  if (args.delay !== undefined) await setSensors({});
+  return answer;
+}
+export async function setSensors(args) {
+  const answer = await settings("/pid_controller/set_sensors", args, (values) => keep("sensors", values));
+  if (args.delay !== undefined) await setPeriod({});
+  return answer;
+}
 export const enable = (data) => settings("/pid_controller/enable", data === undefined ? {} : { data }, (values) => keep("enabled", values.data));
 export const disturb = (effort, seconds) => bridge.call("/arm_sim/disturb", { effort, duration: seconds });
 export const solve = (target) => bridge.call("/ik/solve", target);

@@ -14,6 +14,7 @@ import { exact } from "./format.js";
  * @property {{period?: number, delay?: boolean} | null} period the control period, 0 for every step [s]
  * @property {{viscous?: number[]} | null} friction of each joint [N m s/rad]
  * @property {{effort?: number[] | null, anti_windup?: string, tracking_time?: number} | null} motors their limits [N m], null for none
+ * @property {{encoder_step?: number[], velocity?: string, delay?: number} | null} sensors what the controller measures [rad], and its delay [periods]
  * @property {boolean | null} controller whether it is on
  * @property {number[] | null} setpoint
  * @property {{position?: number[], velocity?: number[]} | null} [start] the start of the arm [rad, rad/s]; only in links
@@ -33,6 +34,7 @@ export const DEFAULTS = {
     period: { period: 0, delay: false },
     friction: { viscous: [0, 0] },
     motors: { effort: null, anti_windup: "clamp", tracking_time: 0.2 },
+    sensors: { encoder_step: [0, 0], velocity: "exact", delay: 0 },
     controller: false,
     setpoint: [0, 0],
   },
@@ -43,13 +45,15 @@ export const DEFAULTS = {
     period: { period: 0, delay: false },
     friction: { viscous: [0, 0, 0] },
     motors: { effort: null, anti_windup: "clamp", tracking_time: 0.2 },
+    sensors: { encoder_step: [0, 0, 0], velocity: "exact", delay: 0 },
     controller: false,
     setpoint: [0, 0, 0],
   },
 };
 
 /** The present settings; null until all are known. @returns {Settings | null} */
-export function presentSettings(/** @type {any} */ { links, integrator, params, gains, period, friction, motors, enabled, setpoint, setpointKnown }) {
+export function presentSettings(/** @type {any} */ live) {
+  const { links, integrator, params, gains, period, friction, motors, sensors, enabled, setpoint, setpointKnown } = live;
   if (!integrator || !params || !gains || !period || enabled == null) return null;
   return {
     integrator,
@@ -58,6 +62,7 @@ export function presentSettings(/** @type {any} */ { links, integrator, params, 
     period: { period: period.period, delay: period.delay },
     friction: friction ?? null,
     motors: motors ?? null,
+    sensors: sensors ?? null,
     controller: enabled,
     setpoint: setpointKnown ? Array.from(setpoint.subarray(0, links)) : null,
   };
@@ -69,7 +74,7 @@ export function hasSettings(settings) {
 }
 
 /** @param {Settings} settings @param {number} links */
-export function toFragment({ integrator, params, gains, period, friction, motors, controller, setpoint }, links) {
+export function toFragment({ integrator, params, gains, period, friction, motors, sensors, controller, setpoint }, links) {
   const list = (/** @type {number[]} */ values) => values.map(exact).join(",");
   const parts = [
     ["links", links], ["method", integrator?.method], ["timestep", exact(integrator?.timestep ?? NaN)],
@@ -81,6 +86,9 @@ export function toFragment({ integrator, params, gains, period, friction, motors
   if (motors) {
     parts.push(["effort_limit", motors.effort ? list(motors.effort) : "none"], ["anti_windup", motors.anti_windup]);
     parts.push(["tracking_time", exact(motors.tracking_time ?? NaN)]);
+  }
+  if (sensors) {
+    parts.push(["encoder_step", list(sensors.encoder_step ?? [])], ["velocity_sensor", sensors.velocity], ["control_delay", exact(sensors.delay ?? NaN)]);
   }
   if (setpoint) parts.push(["setpoint", list(setpoint)]);
   return parts.map(([name, value]) => `${name}=${value}`).join("&");
@@ -108,6 +116,7 @@ export function fromFragment(/** @type {string} */ hash) {
     period: pick(["period", "delay"], (name) => (name === "period" ? single(name) : onOff(name))),
     friction: pick(["viscous"], numbers),
     motors: motorsIn(given, numbers, single),
+    sensors: sensorsIn(given, numbers, single),
     controller: onOff("controller") ?? null,
     setpoint: numbers("setpoint") ?? null,
     ...(given.has("position") || given.has("velocity") ? { start: pick(["position", "velocity"], numbers) } : {}),
@@ -123,6 +132,13 @@ function motorsIn(/** @type {URLSearchParams} */ given, /** @type {(name: string
     ...(anti_windup === null ? {} : { anti_windup }), ...(tracking_time === undefined ? {} : { tracking_time }),
   };
   return Object.keys(found).length > 0 ? found : null;
+}
+
+/** The sensors in a link; null if it has none. @returns {Settings["sensors"]} */
+function sensorsIn(/** @type {URLSearchParams} */ given, /** @type {(name: string) => any} */ numbers, /** @type {(name: string) => any} */ single) {
+  const [encoder_step, velocity, delay] = [numbers("encoder_step"), given.get("velocity_sensor") ?? undefined, single("control_delay")];
+  const found = Object.entries({ encoder_step, velocity, delay }).filter(([, value]) => value !== undefined);
+  return found.length > 0 ? Object.fromEntries(found) : null;
 }
 
 function isSame(/** @type {Settings} */ one, /** @type {Settings | null} */ other) {

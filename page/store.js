@@ -26,6 +26,7 @@ export const state = {
   gains: null, // { kp, ki, kd }
   friction: null, // { viscous }: friction of each joint [N m s/rad]
   motors: null, // { effort, anti_windup, tracking_time }: limits of the efforts [N m] or null, and the anti-windup [s]
+  sensors: null, // { encoder_step, velocity, delay }: what the controller measures [rad, name, periods]
   period: null, // { period, effective_period, delay }: the control period [s]
   paused: null,
   enabled: null, // whether the controller is on

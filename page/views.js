@@ -12,7 +12,8 @@ import { fromFragment, hasSettings, presentSettings, toFragment } from "./settin
 import { set, state, watch } from "./store.js";
 
 /** A link with settings but without a step opens the workbench. */
-const SETTINGS = /(^#|&)(links|method|timestep|gravity|masses|lengths|kp|ki|kd|period|delay|viscous|effort_limit|controller|setpoint|workbench)\b/;
+const SETTINGS = new RegExp("(^#|&)(links|method|timestep|gravity|masses|lengths|kp|ki|kd|period|delay|viscous|effort_limit|encoder_step"
+  + "|velocity_sensor|control_delay|controller|setpoint|workbench)\\b");
 
 export function startViews() {
   byId("view-switch").addEventListener("click", () => show(state.view === "course" ? "workbench" : "course"));

@@ -29,6 +29,24 @@ class Controls(PageTest):
         self.page.click("#friction-switch")
         self.wait(lambda: (self.values("/pid_controller/set_limits")["effort"], self.values("/arm_sim/set_friction")["viscous"]) == (None, [0, 0]), "off")
 
+    def test_a_switch_gives_the_controller_real_sensors_and_a_link_has_them(self):
+        sensors = lambda: self.values("/pid_controller/set_sensors")
+        self.page.until("document.querySelector('#sensors-switch').checkVisibility()")
+        self.page.click("#sensors-switch")
+        self.wait(lambda: sensors() == {"encoder_step": [2 * math.pi / 4096] * 2, "velocity": "difference", "delay": 0}, "12 bits and a difference")
+        for at, value, wanted in (1, "16", {"encoder_step": [2 * math.pi / 65536] * 2}), (3, "3", {"delay": 3}):
+            self.page.run(f"(() => {{ const one = document.querySelector('#sensors-options label:nth-of-type({at}) select'); one.value = '{value}';"
+                          " one.dispatchEvent(new Event('change')); })()")
+            self.wait(lambda wanted=wanted: {key: sensors()[key] for key in wanted} == wanted, f"{wanted}")
+        self.page.until("own('store.js').then(({ state }) => state.period.delay && state.sensors.delay === 3)", why="both settings have the delay")
+        link = self.page.run("own('views.js').then((share) => share.address())")
+        self.assertIn("&velocity_sensor=difference&control_delay=3", link)
+        self.page.click("#controller")
+        asked = "own('store.js').then(async ({ state }) => (await own('question.js')).questionOf(state)?.sensors.delay === 3)"
+        self.page.until(asked, why="the study is asked with this delay")
+        self.page.click("#sensors-switch")
+        self.wait(lambda: sensors() == {"encoder_step": [0, 0], "velocity": "exact", "delay": 0}, "off")
+
     # The view
 
     def test_a_shift_drag_places_the_setpoint_without_a_goal(self):

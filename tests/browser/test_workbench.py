@@ -64,7 +64,7 @@ class Defaults(PageTest):
             "integrator": self.values("/arm_sim/set_integrator"), "params": self.values("/arm_sim/set_params"),
             "gains": self.values("/pid_controller/set_gains"), "controller": self.values("/pid_controller/enable")["data"],
             "friction": self.values("/arm_sim/set_friction"),
-            "motors": self.values("/pid_controller/set_limits"),
+            "motors": self.values("/pid_controller/set_limits"), "sensors": self.values("/pid_controller/set_sensors"),
             "period": {key: value for key, value in self.values("/pid_controller/set_period").items() if key != "effective_period"},
         }
         self.assertEqual(self.page.run(f"own('settings.js').then(({{ DEFAULTS }}) => DEFAULTS[{self.links}])"), {**present, "setpoint": [0] * self.links})

@@ -7,9 +7,10 @@ import { fromRest, loopKey, noGains, questionOf, rolloutArgs, stabilityArgs, wit
 import { DEFAULTS, presentSettings } from "../../page/settings.js";
 
 /** The page's state with these settings and this start. */
-function live({ integrator, params, gains, period, friction, motors, controller, setpoint, start, ...others }) {
+function live({ integrator, params, gains, period, friction, motors, sensors, controller, setpoint, start, ...others }) {
   return {
-    links: 2, integrator, params, gains, period, friction, motors, enabled: controller, setpoint: Float64Array.from([...setpoint, 0]), setpointKnown: true,
+    links: 2, integrator, params, gains, period, friction, motors, sensors, enabled: controller,
+    setpoint: Float64Array.from([...setpoint, 0]), setpointKnown: true,
     position: Float64Array.from([...start.position, 0]), velocity: Float64Array.from([...start.velocity, 0]), ...others,
   };
 }

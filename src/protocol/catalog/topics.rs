@@ -228,6 +228,7 @@ mod tests {
                 "/pid_controller/set_gains",
                 "/pid_controller/set_limits",
                 "/pid_controller/set_period",
+                "/pid_controller/set_sensors",
                 "/rosapi/set_param",
             ]
         );

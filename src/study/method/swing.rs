@@ -6,7 +6,7 @@ use super::super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
 
-/// Duration of the swing, from the horizontal at rest with every joint bent by [`BENT`] \[s\].
+/// Duration of the swing, from the horizontal at rest with every joint bent by 0.3 rad \[s\].
 pub const SWING: f64 = 1.0;
 
 /// The error of position \[rad\] for which the evaluations are counted.
