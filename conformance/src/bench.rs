@@ -15,7 +15,7 @@ use crate::arm::{Arm, State};
 use crate::method::step;
 use crate::peer::{Answer, Peer, Trouble, is_message};
 use crate::run::Run;
-use crate::values::{largest, list, minus, must, near, number, numbers, numbers_of, set, text};
+use crate::values::{boolean, largest, list, minus, must, near, number, numbers, numbers_of, set, text};
 
 /// Standard gravity of the specification.
 pub const GRAVITY: f64 = 9.81;
@@ -538,6 +538,26 @@ pub fn same(before: &Value, after: &Value, members: &[&str]) -> Result<(), Strin
 pub fn has(expected: &Value, got: &Value) -> Result<(), String> {
     let members: Vec<&str> = expected.as_object().into_iter().flatten().map(|(name, _)| name.as_str()).collect();
     same(expected, got, &members)
+}
+
+/// Passes if `{}` is accepted twice and returns the same values.
+pub(crate) fn is_query(bench: &mut Bench, service: &str, members: &[&str]) -> Got {
+    let before = bench.accepted(service, &json!({}))?;
+    let after = bench.accepted(service, &json!({}))?;
+    same(&before, &after, members)?;
+    Ok(after.to_string())
+}
+
+/// Passes if a service of one switch returns it as it was set, also twice.
+pub(crate) fn is_switched(bench: &mut Bench, service: &str) -> Got {
+    for on in [true, false] {
+        bench.accepted(service, &json!({"data": on}))?;
+        for _ in 0..2 {
+            let data = boolean(&bench.accepted(service, &json!({}))?, "data")?;
+            must(data == on, || format!("data {data} after data {on}"))?;
+        }
+    }
+    Ok("data as it was set".to_owned())
 }
 
 /// Passes if a service applies each change alone: its other members stay as in `before`.

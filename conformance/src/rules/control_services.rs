@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::arm::Arm;
-use crate::bench::{Bench, GRAVITY, apply_alone, has, point, same, shifted};
+use crate::bench::{Bench, GRAVITY, apply_alone, has, is_query, is_switched, point, same, shifted};
 use crate::rules::pid::{SMALL, changes, wound_up};
-use crate::values::{boolean, largest, list, must, near, number, numbers_of};
+use crate::values::{largest, list, must, near, number, numbers_of};
 use crate::{Check, Got};
 
 /// The checks of this part.
@@ -216,14 +216,6 @@ const SET_INTEGRATOR: &str = "/arm_sim/set_integrator";
 const SET_PARAMS: &str = "/arm_sim/set_params";
 const PARAMS: [&str; 3] = ["gravity", "masses", "lengths"];
 
-/// Passes if `{}` is accepted twice and returns the same values.
-pub(crate) fn is_query(bench: &mut Bench, service: &str, members: &[&str]) -> Got {
-    let before = bench.accepted(service, &json!({}))?;
-    let after = bench.accepted(service, &json!({}))?;
-    same(&before, &after, members)?;
-    Ok(after.to_string())
-}
-
 /// Passes if the request is rejected, and the service then returns the members of `expected`.
 fn rejects_and_keeps(bench: &mut Bench, service: &str, request: &Value, expected: &Value) -> Got {
     let status = bench.rejected(service, request)?.status;
@@ -255,16 +247,4 @@ fn rejects_arrays(bench: &mut Bench, arrays: [&[f64]; 2]) -> Got {
 pub(crate) fn uneven(links: usize) -> Arm {
     let take = |values: [f64; 3]| values.into_iter().take(links).collect();
     Arm { masses: take([1.4, 0.9, 0.6]), lengths: take([0.8, 1.1, 0.7]), gravity: 6.5 }
-}
-
-/// Passes if a service of one switch returns it as it was set, also twice.
-pub(crate) fn is_switched(bench: &mut Bench, service: &str) -> Got {
-    for on in [true, false] {
-        bench.accepted(service, &json!({"data": on}))?;
-        for _ in 0..2 {
-            let data = boolean(&bench.accepted(service, &json!({}))?, "data")?;
-            must(data == on, || format!("data {data} after data {on}"))?;
-        }
-    }
-    Ok("data as it was set".to_owned())
 }

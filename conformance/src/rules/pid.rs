@@ -7,8 +7,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use crate::bench::{Bench, apply_alone, has, shifted};
-use crate::rules::control_services::{is_query, is_switched};
+use crate::bench::{Bench, apply_alone, has, is_query, is_switched, shifted};
 use crate::values::{largest, list, minus, must, near, plain, set};
 use crate::{Check, Got};
 
