@@ -137,9 +137,10 @@ fn replay(path: &Path) -> ExitCode {
     match verdict {
         Ok(verdict) => {
             let shown = show(&format!("{file}: {verdict}\n"));
-            match verdict.difference {
-                Some(_) => ExitCode::FAILURE,
-                None => shown,
+            if verdict.difference.is_some() || verdict.fault.is_some() {
+                ExitCode::FAILURE
+            } else {
+                shown
             }
         }
         Err(error) => {

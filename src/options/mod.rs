@@ -142,7 +142,9 @@ pub enum Parsed {
     Report(ReportOptions),
     /// Repeat the steps of a recorded run, and compare every state
     #[cfg(feature = "record")]
-    #[command(after_help = "Exit status: 0 if every state is bit-identical, 1 if not.")]
+    #[command(
+        after_help = "Exit status: 0 if every state is bit-identical, 1 if not, or if the file was damaged."
+    )]
     Replay {
         /// The record, from --record or /recorder/start
         file: PathBuf,

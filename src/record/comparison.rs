@@ -46,6 +46,8 @@ pub struct ReplayVerdict {
     pub difference: Option<Difference>,
     /// How the file ended, if it was read to its end.
     pub ending: Option<RecordEnding>,
+    /// Why the file could not be read to its end. The rest was not compared.
+    pub fault: Option<String>,
     /// The version that wrote the record, if it is another one.
     pub other_version: Option<String>,
 }
@@ -140,6 +142,9 @@ impl fmt::Display for ReplayVerdict {
         if self.ending == Some(RecordEnding::Truncated) {
             write!(f, "; the file ends early, and was read up to there")?;
         }
+        if let Some(why) = &self.fault {
+            write!(f, "; the file was read up to a fault: {why}")?;
+        }
         if let Some(version) = &self.other_version {
             write!(
                 f,
@@ -205,7 +210,13 @@ fn play<const N: usize>(
         if run.verdict.difference.is_some() {
             return Ok(run.verdict);
         }
-        next = recording.next_passage()?;
+        next = match recording.next_passage() {
+            Err(why) if run.verdict.states > 0 => {
+                run.verdict.fault = Some(why.to_string());
+                None
+            }
+            passage => passage?,
+        };
     }
     run.verdict.ending = recording.ending();
     if run.verdict.states == 0 {

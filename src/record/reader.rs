@@ -47,6 +47,13 @@ pub enum ReadError {
     /// The system cannot read it.
     #[error(transparent)]
     File(io::Error),
+    /// Its chunks are compressed, as some tools write them.
+    #[error(
+        "its messages are compressed ({}), and only records without compression are read; convert it with \
+         `mcap compress --compression none`",
+        shortened(.0, 20)
+    )]
+    Compressed(String),
     /// It is not an MCAP file, or is damaged.
     #[error("not a record, or damaged: {}", shortened(&.0.to_string(), 200))]
     Mcap(McapError),
@@ -64,6 +71,7 @@ impl From<McapError> for ReadError {
     fn from(error: McapError) -> Self {
         match error {
             McapError::Io(error) => Self::File(error),
+            McapError::UnsupportedCompression(name) => Self::Compressed(name),
             error => Self::Mcap(error),
         }
     }

@@ -14,9 +14,9 @@ use serde_json::{Value, json};
 
 use super::{Dice, Tally, cases, property, run};
 
-/// Most pieces of a computation. A search over all poses of three links has some 10,000, and a search of gains has up
-/// to 144 of them.
-const MOST_PIECES: u64 = 40_000;
+/// Most pieces of a computation. A search over all poses of three links has some 10,000. A plan makes it for each of the
+/// four methods, and a search of gains up to 144 times.
+const MOST_PIECES: u64 = 4 * 12_000;
 /// Five motions of 200 million coefficients, at 2000 in a piece.
 const MOST_PIECES_OF_ROLLOUTS: u64 = 500_000;
 const MOST_PIECES_OF_GAINS: u64 = 144 * 10_000;
@@ -65,7 +65,19 @@ fn arguments<const N: usize>(dice: &mut Dice, service: Service, usual: &Value) -
                 "\"{}\"",
                 ["euler", "midpoint", "verlet", "rk4"][dice.0.usize(0..4)]
             ),
-            ("controller" | "reference", _) | ("delay", true) => dice.0.bool().to_string(),
+            ("controller" | "reference", _) => dice.0.bool().to_string(),
+            ("delay", true) => dice.0.u8(0..=16).to_string(),
+            ("limits", true) => format!(
+                r#"{{"effort":{},"tracking_time":{}}}"#,
+                array(dice),
+                special(dice)
+            ),
+            ("sensors", true) => format!(
+                r#"{{"encoder_step":{},"velocity":"{}","delay":{}}}"#,
+                array(dice),
+                ["exact", "difference"][dice.0.usize(0..2)],
+                dice.0.u8(0..=16)
+            ),
             ("samples", true) => "2".to_owned(),
             ("params", true) => format!(
                 r#"{{"gravity":{},"masses":{},"lengths":{}}}"#,
@@ -79,7 +91,7 @@ fn arguments<const N: usize>(dice: &mut Dice, service: Service, usual: &Value) -
                 array(dice),
                 array(dice)
             ),
-            ("q" | "qd" | "q0" | "qdot0" | "setpoint", true) => array(dice),
+            ("q" | "qd" | "q0" | "qdot0" | "setpoint" | "viscous", true) => array(dice),
             (_, true) => special(dice).to_owned(),
             (name, false) => match usual.get(name) {
                 Some(value) => value.to_string(),
@@ -172,9 +184,11 @@ fn a_prediction_is_about_the_delay_and_the_state_of_its_request() {
     for text in [r#"{"delay":true}"#, r#"{"delay":1}"#] {
         assert!(predicted(text).0 < 0.6 * at_once, "{text}");
     }
+    let late = |delay: u8| predicted(&format!(r#"{{"delay":{delay}}}"#)).0;
+    assert!(late(16) < 0.5 * late(3) && late(3) < 0.8 * late(1));
     assert_eq!(predicted(r#"{"delay":0}"#).0, at_once);
     assert!(predicted(r#"{"q":[0.3,40],"qd":[0,0]}"#).1 > 2.0 * still);
-    let refused = RawValue::from_string(r#"{"delay":2}"#.to_owned()).unwrap();
+    let refused = RawValue::from_string(r#"{"delay":17}"#.to_owned()).unwrap();
     let refused = PredictStability::<2>::read(Service::Stability, &Arguments::from(refused));
     assert!(refused.unwrap_err().to_string().contains("delay"));
 }
