@@ -255,6 +255,16 @@ fn size(matrix: &Matrix) -> f64 {
 
 /// `∂G_k/∂q_j` is entry `max(k, j)` of this \[N m/rad\]. Turning any joint up to `k` turns all links beyond `k` by the
 /// same angle. The derivative is therefore the load of the arm turned by a quarter of a turn.
+///
+/// An entry within the rounding error of the angles is zero: a horizontal arm has no stiffness, and the sign of a
+/// residue would make it grow or not.
 pub(crate) fn gravity_gradient<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> [f64; N] {
-    gravity_load(arm, &moved(q, -1.0, &hanging()))
+    let gradient = gravity_load(arm, &moved(q, -1.0, &hanging()));
+    let largest = gravity_load(arm, &[0.0; N]);
+    let turned: f64 = q.iter().map(|angle| angle.abs()).sum();
+    let rounding = 4.0 * f64::EPSILON * (1.0 + turned);
+    std::array::from_fn(|k| match gradient[k] {
+        entry if entry.abs() <= rounding * largest[k] => 0.0,
+        entry => entry,
+    })
 }

@@ -166,13 +166,14 @@ fn swings_of_almost_the_same_rate_limit_nothing() {
     no_pose_is_worse_than_the_worst::<2>(658, &mut Tally::default());
 }
 
-/// In the first loop a damped joint without a spring falls. In the second a swing grows by 2e-16 of itself per step.
+/// In the first loop a damped joint without a spring falls, by 1e-11 of itself per step. In the second a swing grows by
+/// 2e-16.
 #[test]
 fn a_critical_motion_may_grow_by_less_than_rounding() {
     for case in [195, 197] {
         no_pose_is_worse_than_the_worst::<3>(case, &mut Tally::default());
         let critical = limits(&Dice::of(case).control::<3>()).critical.unwrap();
-        assert_eq!(critical.growth_per_step, 1.0, "{case}: {critical:?}");
+        assert!(critical.growth_per_step < 1.0 + 1e-11, "{case}: {critical:?}");
     }
 }
 
