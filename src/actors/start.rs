@@ -8,8 +8,8 @@ use actix::prelude::*;
 
 use super::arm::follow::PathFollower;
 use super::arm::ik_action::{GoalTracker, IkAction};
-use super::arm::ik_trial::{GoalClient, IkTrial};
-use super::arm::sim::{ArmPose, ArmSim, AttachNodes};
+use super::arm::ik_trial::{GoalClient, IkTrial, TrialArm};
+use super::arm::sim::{ArmSim, AttachNodes};
 use super::compute::study::Study;
 use super::compute::workers::WorkerPool;
 use super::gateway::registry::Registry;
@@ -70,8 +70,11 @@ pub fn start_nodes<const N: usize>(
     Study::attach(&study, nodes);
     let follower = PathFollower::new(arm.clone().recipient(), arm.clone().recipient()).start();
     PathFollower::attach(&follower, nodes);
-    let (pose, tracker) = (arm.clone().recipient(), GoalTracker::of(arm));
-    let (action, _) = start_goal_nodes(pose, tracker, registry, seed, nodes);
+    let of_trial = TrialArm {
+        pose: arm.clone().recipient(),
+        interest: arm.clone().recipient(),
+    };
+    let (action, _) = start_goal_nodes(of_trial, GoalTracker::of(arm), registry, seed, nodes);
     arm.do_send(AttachNodes {
         study: Some(study.recipient()),
         goal_reporters: vec![
@@ -90,7 +93,7 @@ pub fn start_nodes<const N: usize>(
 
 /// Starts the nodes `ik_action` and `ik_trial` around the arm of these recipients.
 pub fn start_goal_nodes<const N: usize>(
-    pose: Recipient<ArmPose<N>>,
+    arm: TrialArm<N>,
     tracker: GoalTracker<N>,
     registry: &Addr<Registry>,
     seed: u64,
@@ -105,7 +108,7 @@ pub fn start_goal_nodes<const N: usize>(
         barrier: action.clone().recipient(),
     };
     let rng = fastrand::Rng::with_seed(seed);
-    let trial = IkTrial::<N>::new(pose, goals, publish(), rng).start();
+    let trial = IkTrial::<N>::new(arm, goals, publish(), rng).start();
     IkTrial::attach(&trial, nodes);
     (action, trial)
 }

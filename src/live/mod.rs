@@ -150,7 +150,8 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         self.publish_lasting(topic);
     }
 
-    /// Whether anything observes the arm: a subscriber of a topic, a goal or a record.
+    /// Whether anything observes the arm: a subscriber of a topic, a trial, a goal or a record. A path asks for the pose
+    /// more often than the arm ticks.
     #[must_use]
     pub fn is_observed(&self) -> bool {
         self.counts.wants_any() || self.goals.is_tracked() || self.journal.is_some()

@@ -11,11 +11,10 @@ use crate::system::{counting_wake_ups, in_virtual_time};
 use crate::virtual_time::{Client, Gateway, WIDE, stand_in};
 use actix::prelude::*;
 use pendularm::actors::arm::ik_action::{CancelRejected, CancelRequest, GoalReport, SendGoal};
-use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, TrialRequest};
+use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, TrialArm, TrialRequest};
 use pendularm::actors::arm::sim::{ArmPose, GoalProgress, Pose};
 use pendularm::actors::gateway::registry::{Attach, Nodes};
-use pendularm::actors::node::Barrier;
-use pendularm::actors::node::Call;
+use pendularm::actors::node::{Barrier, Call, Interest};
 use pendularm::actors::start::start_goal_nodes;
 use pendularm::math::goal::Outcome;
 use pendularm::math::kinematics::{Target, Unreachable};
@@ -58,6 +57,8 @@ struct Script {
     /// Sent to the latest goal's owner only when the trial requests the progress.
     news: Vec<GoalReport<2>>,
     owner: Option<Recipient<GoalReport<2>>>,
+    /// Whether the arm has been told that a trial observes it.
+    observes: bool,
 }
 
 impl Script {
@@ -75,6 +76,10 @@ impl Script {
 
 /// The report that the first goal was reached at this time.
 fn reached_at(time: f64) -> GoalReport<2> {
+    ended_at(time, Outcome::Reached)
+}
+
+fn ended_at(time: f64, outcome: Outcome) -> GoalReport<2> {
     let target = Target {
         position: glam::DVec2::X,
         orientation: None,
@@ -86,7 +91,7 @@ fn reached_at(time: f64) -> GoalReport<2> {
             distance: 0.0,
             elapsed: 0.0,
             pose: pose_at(time),
-            outcome: Some(Outcome::Reached),
+            outcome: Some(outcome),
         },
     }
 }
@@ -95,11 +100,17 @@ fn reached_at(time: f64) -> GoalReport<2> {
 async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Addr<IkTrial<2>>, Client, Instant) {
     let gateway = Gateway::bare().await;
     let born = Instant::now();
-    let (of_arm, of_goals, of_barrier) = (Rc::clone(script), Rc::clone(script), Rc::clone(script));
-    let arm = stand_in(move |_: ArmPose<2>| Pose {
-        lengths: of_arm.borrow().lengths,
-        ..pose_at(born.elapsed().as_secs_f64())
-    });
+    let (of_arm, of_news) = (Rc::clone(script), Rc::clone(script));
+    let (of_goals, of_barrier) = (Rc::clone(script), Rc::clone(script));
+    let arm = TrialArm {
+        pose: stand_in(move |_: ArmPose<2>| Pose {
+            lengths: of_arm.borrow().lengths,
+            ..pose_at(born.elapsed().as_secs_f64())
+        }),
+        interest: stand_in(move |interest: Interest| {
+            of_news.borrow_mut().observes = interest.wanted
+        }),
+    };
     let goals = GoalClient {
         send: stand_in(move |call: Call<SendGoal<2>>| {
             let answer = of_goals.borrow_mut().accept(call.ask);
@@ -145,6 +156,27 @@ fn earlier_messages_of_the_arm_arrive_before_its_time() {
     });
 }
 
+/// Another client's goal takes the place of the trial's, which has none from then on.
+#[test]
+fn a_running_trial_observes_the_arm_with_and_without_a_goal() {
+    in_virtual_time(async {
+        let script = Rc::new(RefCell::new(Script {
+            lengths: [1.0, 1.0],
+            ..Script::default()
+        }));
+        let (trial, mut client, _) = between_stand_ins(&script).await;
+        assert!(!script.borrow().observes, "no trial");
+        begin(&trial, start(2.0, 1e-9, 0.0)).await;
+        assert!(script.borrow().observes, "a goal");
+        let owner = script.borrow().owner.clone().unwrap();
+        owner.do_send(ended_at(0.1, Outcome::Preempted));
+        assert_eq!(status(&mut client).await["action_status"], "preempted");
+        assert!(script.borrow().observes, "no goal");
+        sleep(ms(2000)).await;
+        assert!(!script.borrow().observes, "the trial is over");
+    });
+}
+
 /// A goal is refused because the lengths have changed: the next target fits the new ones.
 #[test]
 fn after_a_refusal_another_target_is_sampled_for_the_lengths_of_that_moment() {
@@ -180,7 +212,11 @@ fn no_timer_runs_without_a_goal_a_trial_or_a_subscriber() {
         let gateway = Gateway::bare().await;
         let registry = &gateway.registry;
         let mut nodes = Nodes::default();
-        let (arm, tracker) = (silent_arm(), silent_tracker());
+        let arm = TrialArm {
+            pose: silent_arm(),
+            interest: stand_in(|_: Interest| ()),
+        };
+        let tracker = silent_tracker();
         let (action, trial) = start_goal_nodes::<2>(arm, tracker, registry, 1, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
         let mut client = gateway.connect(WIDE).remembering();

@@ -28,7 +28,9 @@ const LONGEST_NAP: Duration = Duration::from_secs(3600);
 
 /// The node `ik_trial` for an arm of `N` links.
 pub struct IkTrial<const N: usize> {
-    arm: Recipient<ArmPose<N>>,
+    arm: TrialArm<N>,
+    /// Whether the arm has been told that a trial runs.
+    observes: bool,
     goals: GoalClient<N>,
     publish: Recipient<Publish>,
     trial: Trial,
@@ -50,13 +52,14 @@ impl<const N: usize> IkTrial<N> {
     /// A node that has not run a trial yet; the targets come from `rng`.
     #[must_use]
     pub fn new(
-        arm: Recipient<ArmPose<N>>,
+        arm: TrialArm<N>,
         goals: GoalClient<N>,
         publish: Recipient<Publish>,
         rng: fastrand::Rng,
     ) -> Self {
         Self {
             arm,
+            observes: false,
             goals,
             publish,
             trial: Trial::default(),
@@ -150,7 +153,7 @@ impl<const N: usize> IkTrial<N> {
     /// Sends a request to the arm, and continues after all its earlier news. They are in this node's mailbox before the
     /// barrier is answered, and an actor empties its mailbox before it continues a future.
     fn ask_arm(&self, intent: Intent, ctx: &mut Context<Self>) {
-        let (arm, barrier) = (self.arm.clone(), self.goals.barrier.clone());
+        let (arm, barrier) = (self.arm.pose.clone(), self.goals.barrier.clone());
         let question = async move {
             let pose = arm.send(ArmPose).await.ok();
             let _ = barrier.send(Barrier).await;
@@ -238,7 +241,7 @@ impl<const N: usize> IkTrial<N> {
         }
         let carried_out = carry_out(
             about_goals,
-            self.arm.clone(),
+            self.arm.pose.clone(),
             self.goals.clone(),
             ctx.address().recipient(),
         );
@@ -282,8 +285,15 @@ impl<const N: usize> IkTrial<N> {
             .do_send(Publish::made(Topic::TrialStatus, move || message));
     }
 
-    /// Sets the timers of the present state, and no others.
+    /// Sets the timers of the present state, and no others. A running trial observes the arm, also without a goal.
     fn keep_timers(&mut self, ctx: &mut Context<Self>) {
+        let running = self.trial.running();
+        if std::mem::replace(&mut self.observes, running) != running {
+            self.arm.interest.do_send(Interest {
+                topic: Topic::TrialStatus,
+                wanted: running,
+            });
+        }
         match self.trial.remaining() {
             None => self.cancel_deadline(ctx),
             Some(remaining) if self.deadline.is_none() => {
@@ -321,7 +331,16 @@ impl<const N: usize> IkTrial<N> {
     }
 }
 
-// ---- the goals of a trial: each command is completed before the next ------------------------------------------------
+// ---- the arm and the goals of a trial: each command is completed before the next ------------------------------------
+
+/// The messages to the arm.
+#[derive(Clone)]
+pub struct TrialArm<const N: usize> {
+    /// Asks where it is.
+    pub pose: Recipient<ArmPose<N>>,
+    /// Tells it whether a trial observes it.
+    pub interest: Recipient<Interest>,
+}
 
 /// The messages to `ik_action`.
 #[derive(Clone)]

@@ -173,7 +173,10 @@ fn a_critical_motion_may_grow_by_less_than_rounding() {
     for case in [195, 197] {
         no_pose_is_worse_than_the_worst::<3>(case, &mut Tally::default());
         let critical = limits(&Dice::of(case).control::<3>()).critical.unwrap();
-        assert!(critical.growth_per_step < 1.0 + 1e-11, "{case}: {critical:?}");
+        assert!(
+            critical.growth_per_step < 1.0 + 1e-11,
+            "{case}: {critical:?}"
+        );
     }
 }
 
