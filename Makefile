@@ -166,8 +166,8 @@ bench-peers: ## Compare with Pinocchio and its generated C, MuJoCo, scipy, heyok
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/peers/run.sh
 	@case " $(ARGS) " in *" --quick "*) ;; *) KEEP="$(KEEP)" bash benches/equal_error/run.sh ;; esac
 
-attack: ## Attack the program in about eighty ways and measure the service of a healthy client; ARGS="--only=pings", --list or --quick
-	@echo "make attack: some seven minutes"
+attack: ## Attack the program in about ninety ways and measure the service of a healthy client; ARGS="--only=pings", --list or --quick
+	@echo "make attack: some eight minutes"
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/attack/run.sh
 
 soak: ## Play random attacks for MINUTES=1 and check that no resources are left; SEED=n repeats one

@@ -2,7 +2,7 @@
 # `make attack`: measures the service of a healthy client of the release program during attacks, one after the other.
 #
 # Everything runs on free ports of loopback, bounded in time and connections. Started programs are stopped by id. It
-# takes about seven minutes. ARGS="--only=pings,step" selects attacks, ARGS=--list lists them. ARGS=--quick takes two
+# takes about eight minutes. ARGS="--only=pings,step" selects attacks, ARGS=--list lists them. ARGS=--quick takes two
 # minutes, has longer limits, and repeats late attacks up to twice. KEEP=1 keeps the table in
 # benches/results/<date>-<processor>/attack/. Exit status 1 if a bar is missed.
 set -euo pipefail

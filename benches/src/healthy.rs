@@ -24,6 +24,10 @@ const CALLS: Duration = Duration::from_millis(10);
 const VISITS: Duration = Duration::from_millis(250);
 /// Bytes of the message that a newcomer sends to itself.
 const MESSAGE: usize = 256 * 1024;
+/// The same for a newcomer with long requests: the message and a call need permits.
+const LONG_MESSAGE: usize = 1024 * 1024;
+/// Time for a request that needs a permit: the time for which another client may hold it, and its own.
+const LONG_PATIENCE: Duration = Duration::from_secs(30);
 
 /// The attacked server, for the healthy clients.
 #[derive(Clone, Copy)]
@@ -34,6 +38,8 @@ pub struct Target {
     pub locked: bool,
     /// Time until a call or a new client counts as not answered.
     pub patience: Duration,
+    /// Whether newcomers have long requests.
+    pub long: bool,
 }
 
 /// The calls, messages and connections of the healthy clients, with their delays.
@@ -202,8 +208,13 @@ fn come_and_go(target: Target, stop: &AtomicBool) -> Health {
     health
 }
 
-/// Calls its own service, sends itself a message, and requests a small computation and the page.
+/// Calls its own service, sends itself a message, and requests a small computation and the page. A newcomer with long
+/// requests has a long message and long answers, and asks `study` and `rosapi` too.
 fn visit(target: Target, number: usize) -> Result<(), String> {
+    let (message, steps, patience) = match target.long {
+        true => (LONG_MESSAGE, 20_000, LONG_PATIENCE),
+        false => (MESSAGE, 100, target.patience),
+    };
     let mut client = target.connect()?;
     let client = &mut client;
     let service = format!("/newcomer/{number}/service");
@@ -223,12 +234,12 @@ fn visit(target: Target, number: usize) -> Result<(), String> {
     calling().map_err(part("a forwarded call"))?;
 
     let mut publishing = || {
-        let content = "x".repeat(MESSAGE);
+        let content = "x".repeat(message);
         send(client, &json!({"op": "subscribe", "topic": topic}))?;
         send(client, &json!({"op": "advertise", "topic": topic}))?;
         let message = json!({"op": "publish", "topic": topic, "msg": {"data": content}});
         send(client, &message)?;
-        let came = next(client, "publish", target.patience)?;
+        let came = next(client, "publish", patience)?;
         let whole = came["msg"]["data"] == content;
         whole
             .then_some(())
@@ -236,15 +247,31 @@ fn visit(target: Target, number: usize) -> Result<(), String> {
     };
     publishing().map_err(part("a message to itself"))?;
 
-    let mut computing = || {
-        let args = json!({"function": "t", "x0": 0, "dt": 0.01, "steps": 100, "integrator": "rk4"});
-        let service = "/arm_sim/integration_step";
-        let call = pendularm_client::call(service, &args, &json!("compute"));
-        send(client, &call)?;
-        succeeded(&next(client, "service_response", target.patience)?)
+    let mut ask = |service: &'static str, args: Value| {
+        let mut asking = || {
+            send(
+                client,
+                &pendularm_client::call(service, &args, &json!("ask")),
+            )?;
+            succeeded(&next(client, "service_response", patience)?)
+        };
+        asking().map_err(part(service))
     };
-    computing().map_err(part("a computation"))?;
-    see_the_page(target).map_err(part("the page"))
+    ask(
+        "/arm_sim/integration_step",
+        json!({"function": "t", "x0": 0, "dt": 0.01, "steps": steps, "integrator": "rk4"}),
+    )?;
+    if target.long {
+        // The question has more bytes than a frame without a permit.
+        let padding = "x".repeat(100 * 1024);
+        ask("/arm_sim/pause", json!({"padding": padding}))?;
+        ask(
+            "/study/stability",
+            json!({"gains": {"kp": [100 + number, 50]}}),
+        )?;
+        ask("/rosapi/topics_and_raw_types", json!({}))?;
+    }
+    see_the_page(target, patience).map_err(part("the page"))
 }
 
 /// The next frame of that operation; an error status ends the wait.
@@ -271,16 +298,16 @@ fn succeeded(response: &Value) -> Result<(), String> {
     }
 }
 
-fn see_the_page(target: Target) -> Result<(), String> {
+fn see_the_page(target: Target, patience: Duration) -> Result<(), String> {
     let query = if target.locked {
         format!("?token={TOKEN}")
     } else {
         String::new()
     };
     let fetch = || {
-        let mut stream = TcpStream::connect_timeout(&target.address, target.patience)?;
-        stream.set_read_timeout(Some(target.patience))?;
-        stream.set_write_timeout(Some(target.patience))?;
+        let mut stream = TcpStream::connect_timeout(&target.address, patience)?;
+        stream.set_read_timeout(Some(patience))?;
+        stream.set_write_timeout(Some(patience))?;
         let request = format!("GET /{query} HTTP/1.1\r\nHost: {}\r\n\r\n", target.address);
         stream.write_all(request.as_bytes())?;
         let mut head = [0; 12];

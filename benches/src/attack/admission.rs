@@ -69,7 +69,8 @@ pub const ATTACKS: &[Attack] = &[
                 .times(64)
         },
     )
-    .with(&["--report", REPORT]),
+    .with(&["--report", REPORT])
+    .holds(),
 ];
 
 /// A foreign host, a foreign origin, a wrong version of WebSocket, a head that is too long, and one of too many lines.

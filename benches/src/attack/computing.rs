@@ -77,14 +77,14 @@ pub const ATTACKS: &[Attack] = &[
     .fills(),
 ];
 
-fn steps(function: &str, steps: usize) -> String {
+pub(super) fn steps(function: &str, steps: usize) -> String {
     let rest = format!(r#""x0":0.3333333333333333,"dt":1e-3,"steps":{steps},"integrator":"rk4""#);
     let args = format!(r#"{{"function":"{function}",{rest}}}"#);
     call("/arm_sim/integration_step", "1", &args)
 }
 
 /// Ten seconds of motion in steps of a microsecond.
-fn rollout(further: &str) -> String {
+pub(super) fn rollout(further: &str) -> String {
     let args = format!(r#"{{"q0":[0.4,-0.3],"duration":10,"timestep":1e-6{further}}}"#);
     call("/study/rollout", "1", &args)
 }

@@ -11,6 +11,7 @@ pub mod computing;
 pub mod crowds;
 pub mod forms;
 pub mod gateway;
+pub mod holding;
 pub mod memory;
 pub mod names;
 pub mod reading;
@@ -40,6 +41,8 @@ pub struct Attack {
     pub fills: bool,
     /// Moves the arm or changes its settings.
     pub moves: bool,
+    /// Holds what long frames and long answers need, so newcomers ask for both and have the time of a permit.
+    pub holds: bool,
 }
 
 impl Attack {
@@ -53,6 +56,7 @@ impl Attack {
             locked: false,
             fills: false,
             moves: false,
+            holds: false,
         }
     }
 
@@ -77,6 +81,14 @@ impl Attack {
         }
     }
 
+    /// An attack that holds what long frames and long answers need.
+    pub const fn holds(self) -> Self {
+        Self {
+            holds: true,
+            ..self
+        }
+    }
+
     /// An attack that moves the arm or changes its settings.
     pub const fn moves(self) -> Self {
         Self {
@@ -92,13 +104,14 @@ pub fn picks(words: &str, name: &str) -> bool {
 }
 
 /// All attacks, by their target.
-pub fn groups() -> [(&'static str, &'static [Attack]); 10] {
+pub fn groups() -> [(&'static str, &'static [Attack]); 11] {
     [
         ("gateway", gateway::ATTACKS),
         ("websocket", websocket::ATTACKS),
         ("arm", arm::ATTACKS),
         ("computing", computing::ATTACKS),
         ("memory", memory::ATTACKS),
+        ("holding", holding::ATTACKS),
         ("forms", forms::ATTACKS),
         ("names", names::ATTACKS),
         ("reading", reading::ATTACKS),

@@ -92,6 +92,7 @@ fn soak(path: &str, time: Duration, seed: u64) -> Result<bool, String> {
         address,
         locked: false,
         patience: PATIENCE,
+        long: false,
     })?;
     let mut rng = fastrand::Rng::with_seed(seed);
     let (mut bars, mut ebbs) = (Bars::default(), Vec::new());

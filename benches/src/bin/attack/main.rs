@@ -162,6 +162,7 @@ fn endure(attack: &Attack, plan: &Plan) -> Result<Row, String> {
         address,
         locked: attack.locked,
         patience: plan.patience,
+        long: attack.holds,
     })?;
     let (health, peak, ended) = std::thread::scope(|scope| {
         std::thread::sleep(CALM);
