@@ -42,7 +42,7 @@ class Controls(PageTest):
         link = self.page.run("own('views.js').then((share) => share.address())")
         self.assertIn("&velocity_sensor=difference&control_delay=3", link)
         self.page.click("#controller")
-        asked = "own('store.js').then(async ({ state }) => (await own('question.js')).questionOf(state)?.sensors.delay === 3)"
+        asked = "own('store.js').then(async ({ state }) => (await own('question.js')).questionOf(state)?.sensors?.delay === 3)"
         self.page.until(asked, why="the study is asked with this delay")
         self.page.click("#sensors-switch")
         self.wait(lambda: sensors() == {"encoder_step": [0, 0], "velocity": "exact", "delay": 0}, "off")

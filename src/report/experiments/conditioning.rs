@@ -2,7 +2,7 @@
 //!
 //! The reference is the Lagrangian with 106 bits ([`exact_acceleration`]). Two solvers are compared with it: the live
 //! arm's recursion, and elimination of `M(q)` in joint space, as in textbooks. The inherent loss is the effect on the
-//! reference of a change of the angles by half a unit in the last place. No algorithm can lose less.
+//! reference of a change of the angles by half a unit in the last place. It is a scale, not a bound: the angles are exact.
 //!
 //! **Invariant:** every solver gets the same states.
 

@@ -38,7 +38,7 @@ impl Swing {
         drift.map_or(f64::NAN, |point| point.1)
     }
 
-    /// Whether the better method keeps energy better. A run that diverged has no final value to compare.
+    /// Whether the better method keeps energy better. A diverged run of Euler counts by its last value.
     fn is_ordered(&self) -> bool {
         let order_two = self.end(Method::Midpoint).min(self.end(Method::Verlet));
         let euler = self.end(Method::Euler);

@@ -14,7 +14,7 @@ pub(super) fn make(section: &mut Section) {
     let mut table = Table::new(
         "scenarios",
         "Every scene, as expected and as observed",
-        "Expectations come from theory or from the arm's own prediction, never from an earlier run.",
+        "Expectations come from theory or from the arm's own prediction. Only the rates of S05 and S06 are from earlier runs.",
         ["", "Scene", "Expected", "Observed", ""],
     );
     let (mut run, mut short, mut panels) = (0, Vec::new(), Vec::new());
