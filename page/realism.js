@@ -1,7 +1,7 @@
 // The panel Realism: what a real arm has and the ideal one has not, each with a switch. A text says which number of a data sheet it is.
 // Invariant: a switch shows what the runtime has. The panel is hidden while the runtime has none of it.
 
-import { byId, el, setText } from "./dom.js";
+import { byId, el } from "./dom.js";
 import { refusal } from "./field.js";
 import { gravityLoad } from "./mechanics.js";
 import { setFriction, setMotors, setSensors } from "./runtime.js";
@@ -53,36 +53,27 @@ export function startRealism() {
     if (!motors) return;
     const isOn = motors.effort !== null;
     limited.setAttribute("aria-checked", String(isOn));
-    byId("limit-options").hidden = byId("limit-fields").hidden = !isOn;
+    byId("limit-options").hidden = byId("limit-fields").hidden = byId("limit-text").hidden = !isOn;
     cure.value = motors.anti_windup;
-    setText(byId("limit-text"), isOn
-      ? "The peak torque in the data sheet of a motor with its gear. Stability limits hold while no torque is at its limit."
-      : "Off: the motors give any torque.");
   });
   watch(["friction", "links"], () => {
     const { friction } = state;
-    rubbed.hidden = byId("friction-text").hidden = friction === null;
+    rubbed.hidden = friction === null;
     if (!friction) return;
     const isOn = friction.viscous.some((one) => one > 0);
     rubbed.setAttribute("aria-checked", String(isOn));
-    byId("friction-fields").hidden = !isOn;
-    setText(byId("friction-text"), isOn
-      ? "The viscous friction in the data sheet of a gear: a torque against the speed, in proportion to it. It takes energy, and limits include it."
-      : "Off: the joints have no friction.");
+    byId("friction-fields").hidden = byId("friction-text").hidden = !isOn;
   });
   watch(["sensors", "links"], () => {
     const { sensors } = state;
-    sensing.hidden = byId("sensors-text").hidden = sensors === null;
-    byId("sensors-options").hidden = !sensors || !isReal(sensors);
+    sensing.hidden = sensors === null;
+    byId("sensors-options").hidden = byId("sensors-text").hidden = !sensors || !isReal(sensors);
     if (!sensors) return;
     sensing.setAttribute("aria-checked", String(isReal(sensors)));
     const shown = BITS.find((one) => Math.abs(stepOf(one) - sensors.encoder_step[0]) < 1e-12);
     bits.value = sensors.encoder_step[0] === 0 ? EXACT : String(shown ?? "");
     speed.value = sensors.velocity;
     delay.value = String(sensors.delay);
-    setText(byId("sensors-text"), isReal(sensors)
-      ? "The resolution in the data sheet of an encoder, a velocity from its counts, and the latency of sensors and bus. Limits leave out the counts."
-      : "Off: the controller sees the state itself, at once.");
   });
 }
 
