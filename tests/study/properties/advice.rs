@@ -13,9 +13,6 @@ use super::{Dice, Tally, advised, cases, property, run};
 /// Steps of a run at most; a longer one is cut.
 const MOST_STEPS: f64 = 3e5;
 
-/// Starts beside one whose loop does not settle at the advised timestep.
-const NEARBY: u32 = 16;
-
 /// From weak springs to stiff ones, from weak damping to strong, with or without integrals. One loop in four has joints
 /// that differ by any factor, so a strong one throws the links behind a weak one.
 fn gains<const N: usize>(dice: &mut Dice, control: &ControlLoop<N>) -> Gains<N> {
@@ -109,24 +106,13 @@ fn a_settling_loop_does_not_diverge_at_the_advised_timestep<const N: usize>(
     if speed < 1.0 || speed < 0.9 * ends(method, timestep, duration, &start) {
         return;
     }
-    // It may rest for a while where it cannot stay, or a loop with integrals can have a swing that lasts beside its
-    // rest. Then a small difference decides.
-    let mut nearby = (0..NEARBY).map(|_| State {
-        position: start.position.map(|q| q + 0.01 * dice.any()),
-        velocity: start.velocity.map(|v| v * (1.0 + 0.01 * dice.any())),
-    });
-    let swings = |duration: f64, start: &State<N>| {
-        (0.01..100.0).contains(&ends(Method::Rk4, small, duration, start))
-    };
-    if speed.is_finite()
-        && (swings(3.0 * duration, &start) || nearby.any(|start| swings(duration, &start)))
-    {
-        tally.tried -= 1;
-        tally.open += 1;
-        return;
-    }
     println!("case {case}: {speed} rad/s at {timestep} s: {control:?} {start:?}");
-    tally.outside += 1;
+    // A loop with integrals can have a swing that lasts beside its rest, and a small difference decides between them.
+    if speed.is_finite() {
+        tally.unsettled += 1;
+    } else {
+        tally.outside += 1;
+    }
 }
 
 /// The advice must count the energy of the whole move, and a link that spins.
@@ -136,7 +122,8 @@ fn known_motions_do_not_diverge_at_the_advised_timestep() {
     a_settling_loop_does_not_diverge_at_the_advised_timestep::<2>(3_005_320, &mut tally);
     a_settling_loop_does_not_diverge_at_the_advised_timestep::<2>(3_008_016, &mut tally);
     a_settling_loop_does_not_diverge_at_the_advised_timestep::<2>(4_106_218, &mut tally);
-    assert_eq!((tally.tried, tally.outside), (3, 0), "{tally:?}");
+    let failed = tally.outside + tally.unsettled;
+    assert_eq!((tally.tried, failed), (3, 0), "{tally:?}");
 }
 
 #[test]
@@ -147,6 +134,7 @@ fn a_settling_motion_does_not_diverge_at_the_advised_timestep() {
         100_000
     );
     assert_eq!(tally.outside, 0, "{tally:?}");
+    assert!(tally.unsettled <= tally.tried / 100, "{tally:?}");
     // Many of these loops never settle.
     assert!(4 * tally.tried > tally.open, "{tally:?}");
 }

@@ -113,6 +113,8 @@ struct Tally {
     open: u64,
     /// Cases in which it did not hold.
     outside: u64,
+    /// Cases that stayed bounded but did not come to rest, of claims about motions that should.
+    unsettled: u64,
 }
 
 /// Runs cases, and prints how many applied.
