@@ -116,10 +116,10 @@ function tracked({ times: own, positions, energy }, n) {
 }
 
 function showTable(found, away, reference, lasted) {
-  const lines = found.map((run, i) => describeRun(run, away[i], lasted));
+  const lines = found.map((run, i) => describeRun(run, away[i]));
   fillTable(byId("compare-table"), ["method", ...COLUMNS.map(([, name]) => name)],
     lines.map((line, i) => [[line.name, `method${i + 1}`], ...COLUMNS.map(([key]) => line[key])]));
-  const ended = endOf(reference.times, lasted, reference.timestep);
+  const ended = endOf(reference);
   const text = `At ${duration(found[0].timestep)}, against Runge–Kutta 4 at ${duration(reference.timestep)}, for `
     + `${duration(lasted)}.${ended === null ? "" : ` The reference diverged after t = ${fixed(ended, 2)} s, so no error is known.`}`;
   setText(byId("compare-text"), text);

@@ -36,12 +36,12 @@ export function rungs(period = 0) {
 }
 
 /**
- * @param {{method: string, timestep: number}} rung @param {{times: number[], error: number | null, sampling_error?:
- * number | null, error_uncertainty?: number | null, wall_time: number, evaluations: number}} values @param {number}
- * seconds the requested duration @returns {Rung}
+ * @param {{method: string, timestep: number}} rung @param {{error: number | null, sampling_error?: number | null,
+ * error_uncertainty?: number | null, wall_time: number, evaluations: number, divergence?: {time: number} | null}} values
+ * @returns {Rung}
  */
-export function read({ method, timestep }, values, seconds) {
-  const divergedAt = endOf(values.times, seconds, timestep);
+export function read({ method, timestep }, values) {
+  const divergedAt = endOf(values);
   const isWhole = divergedAt === null;
   return {
     method,
@@ -97,10 +97,9 @@ export function uncertaintyOf(rungs) {
   return known.length > 0 ? Math.max(...known) : null;
 }
 
-/** The time at which a run diverged [s]; null if it did not. @param {number[]} times @param {number} duration @param {number} timestep */
-export function endOf(times, duration, timestep) {
-  const last = times.at(-1) ?? 0;
-  return last < duration - timestep * (1 + 1e-6) ? last : null;
+/** The time at which a run diverged [s]; null if it did not. @param {{divergence?: {time: number} | null}} values of the answer */
+export function endOf({ divergence }) {
+  return divergence?.time ?? null;
 }
 
 /** For each method the cheapest run with an error of at most `wanted` [rad]. @param {Rung[]} rungs @param {number} wanted */
@@ -122,6 +121,7 @@ export function cheapest(rungs, wanted) {
  * @property {(number | null)[]} energy
  * @property {number} evaluations
  * @property {number} wall_time
+ * @property {{time: number} | null} [divergence]
  */
 
 /**
@@ -139,9 +139,9 @@ export function distances(run, reference) {
 /** At a larger distance it is another motion [rad]. */
 const PARTED = 0.1;
 
-/** A line of the table. A run is judged only by a reference that lasts as long. @param {Run} run @param {(number | null)[]} away @param {number} seconds */
-export function describeRun(run, away, seconds) {
-  const ended = endOf(run.times, seconds, run.timestep);
+/** A line of the table. A run is judged only by a reference that lasts as long. @param {Run} run @param {(number | null)[]} away */
+export function describeRun(run, away) {
+  const ended = endOf(run);
   const gained = (run.energy.at(-1) ?? NaN) - (run.energy[0] ?? NaN); // an energy that overflowed is null
   const parts = run.times[away.findIndex((one) => Number(one) > PARTED)];
   const isJudged = ended === null && run.times.every((_, k) => away[k] != null);

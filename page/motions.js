@@ -44,7 +44,7 @@ export function motionsOf(scene) {
 
 /** What is drawn of an answer. @param {Wanted} wanted @param {any} values @param {boolean} isCorrect @param {number} playedIn [s] @returns {Motion} */
 export function motionOf({ question, run }, values, isCorrect, playedIn) {
-  const ended = endOf(values.times, run.duration, question.timestep);
+  const ended = endOf(values);
   const slower = playedIn / run.duration;
   const pace = slower > 1 ? `${significant(slower, 2)} times slower` : `${significant(1 / slower, 2)} times faster`;
   return {

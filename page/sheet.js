@@ -56,7 +56,7 @@ async function make() {
       return false;
     }
     const move = await rollout(moveOf(question), { duration: MOVE, samples: SAMPLES, reference: true });
-    const error = move.result ? errorText({ ...read({ method: integrator, timestep: AT }, move.values, MOVE), sampling: null }) : move.status;
+    const error = move.result ? errorText({ ...read({ method: integrator, timestep: AT }, move.values), sampling: null }) : move.status;
     answers[integrator] = { ...answer.values, error };
   }
   said.show("");

@@ -28,7 +28,7 @@ export async function climb(move, length, isWanted, tell) {
     const again = await rollout(question, { ...run, reference: false });
     const wall = Math.min(answer.values.wall_time, again.values.wall_time ?? Infinity);
     if (!isWanted()) return "";
-    tell(read(rung, { ...answer.values, wall_time: wall }, length));
+    tell(read(rung, { ...answer.values, wall_time: wall }));
   }
   return "";
 }

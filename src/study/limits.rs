@@ -81,7 +81,7 @@ pub struct Limits<const N: usize> {
     pub minimum_continuous: Option<f64>,
     /// A timestep up to which every pose is stable, effort held over the step; `None` if no useful bound is known.
     pub bound: Option<f64>,
-    /// Whether `bound` is proven without an estimate: with Euler, and without gravity.
+    /// Whether `bound` holds without an estimate, up to rounding: with Euler, and without gravity.
     pub bound_is_proven: bool,
     /// Whether `minimum_held` and `bound` agree to 1 %. The smallest limit may then be up to 1 % below `minimum_held`.
     pub certified: bool,

@@ -1,5 +1,5 @@
-//! A lower bound of the timestep limit: a timestep up to which a loop is stable in every pose. It is proven for Euler,
-//! and without gravity.
+//! A lower bound of the timestep limit: a timestep up to which a loop is stable in every pose, up to rounding. For Euler,
+//! and without gravity, it needs no estimate.
 //!
 //! For a step with held effort, `z x = …` for an eigenvector x with eigenvalue z, put `z = (1 + w h/2) / (1 - w h/2)`:
 //! the unit circle becomes the left half plane of `w`. Under a constant effort the arm moves on a parabola, which every
@@ -33,7 +33,8 @@
 //! Source: Lancaster, *Lambda-Matrices and Vibrating Systems* (1966), ch. 7, on quadratic forms of a pencil; Lawler and
 //! Wood, *Branch-and-bound methods* (1966), on the search. Their combination is our own.
 //!
-//! **Invariant:** the bound holds whenever the search ends, under gravity if the estimate holds. The number of boxes is
+//! **Invariant:** in exact arithmetic the bound holds whenever the search ends, under gravity if the estimate holds. The
+//! rounding of the inequalities is not bounded; it is far below their distance from the limit. The number of boxes is
 //! bounded.
 
 use std::collections::BTreeMap;

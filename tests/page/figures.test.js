@@ -10,12 +10,13 @@ import { LogScale } from "../../page/scale.js";
 import { DEFAULTS } from "../../page/settings.js";
 import { state } from "../../page/store.js";
 
-/** A run of one joint at 0.1 s through `seconds`, at `slope` rad/s. */
+/** A run of one joint at 0.1 s through `seconds` of 2 s, at `slope` rad/s. */
 function run(seconds, slope, energy = 1) {
   const times = Array.from({ length: Math.round(seconds * 10) + 1 }, (_, k) => k / 10);
   return {
     method: "euler", timestep: 0.1, times, positions: times.map((t) => [slope * t]), velocities: times.map(() => [slope]),
     energy: times.map((t) => energy * t), evaluations: times.length, wall_time: 1e-3,
+    divergence: seconds < 2 ? { step: times.length, time: seconds } : null,
   };
 }
 
@@ -23,30 +24,30 @@ test("a finished run has figures, and no divergence", () => {
   const [one, reference] = [run(2, 1.6), run(2, 1)];
   const away = distances(one, reference);
   assert.ok(Math.abs(away.at(-1) - 1.2) < 1e-9);
-  const line = describeRun(one, away, 2);
+  const line = describeRun(one, away);
   assert.deepEqual([line.outcome, line.energy, line.error], ["0.1 rad off from 0.20 s on", "2 J", "1.2 rad"]);
-  assert.equal(describeRun(one, away.map(() => 0.05), 2).outcome, "within 0.1 rad");
+  assert.equal(describeRun(one, away.map(() => 0.05)).outcome, "within 0.1 rad");
 });
 
 test("a run that diverged has its time, but no energy and no error", () => {
   const one = run(0.6, 3);
   one.energy[6] = null;
   const away = distances(one, run(2, 1));
-  const line = describeRun(one, away, 2);
+  const line = describeRun(one, away);
   assert.equal(line.outcome, "diverged at t = 0.60 s");
   assert.deepEqual([line.energy, line.error], ["–", "–"]);
   assert.equal(away[7], null);
   assert.notEqual(away[6], null);
-  // The last sample may lie a step before the end.
-  assert.equal(endOf([0, 0.9], 1, 0.1), null);
-  assert.equal(endOf([0, 0.8], 1, 0.1), 0.8);
+  // The last step may be the one that diverged.
+  assert.equal(endOf(run(1.9, 3)), 1.9);
+  assert.equal(endOf(run(2, 3)), null);
 });
 
 test("a run is not judged by a reference that ended before it, and energy that overflowed is not known", () => {
   const one = run(2, 1);
   one.energy[20] = null;
   for (const reference of [run(0, 1), run(1.5, 9)]) {
-    const { outcome, energy, error } = describeRun(one, distances(one, reference), 2);
+    const { outcome, energy, error } = describeRun(one, distances(one, reference));
     assert.deepEqual([outcome, energy, error], ["–", "–", "–"]);
   }
 });
@@ -131,25 +132,25 @@ test("between two states the trail follows the motion, and is straight across a 
 });
 
 test("an error, one below the reference's uncertainty, and one of a chaotic motion differ", () => {
-  const rung = (error, error_uncertainty, end = 2) => read(
-    { method: "rk4", timestep: 0.001 }, { times: [0, end], error, error_uncertainty, wall_time: 1e-3, evaluations: 1 }, 2,
+  const rung = (error, error_uncertainty, divergence = null) => read(
+    { method: "rk4", timestep: 0.001 }, { divergence, error, error_uncertainty, wall_time: 1e-3, evaluations: 1 },
   );
   assert.equal(errorText(rung(0.00234, 1e-13)), "0.0023");
   assert.equal(errorText(rung(null, 2e-13)), "< 2e\u221212");
   assert.equal(errorText(rung(null, 0.4)), "too wild to follow");
   assert.equal(errorText(rung(null, null)), "no figure");
-  assert.equal(errorText(rung(1, 1e-13, 0.5)), "diverged at 0.5 s");
+  assert.equal(errorText(rung(1, 1e-13, { time: 0.5 })), "diverged at 0.5 s");
   assert.equal(uncertaintyOf([rung(1, 1e-13), rung(1, 3e-13), rung(1, null)]), 3e-13);
   assert.equal(uncertaintyOf([rung(1, undefined)]), null);
 });
 
 test("a closed loop has two errors, and a run that diverged has none", () => {
-  const values = { times: [0, 1, 2], error: 1e-8, sampling_error: 8e-3, error_uncertainty: 1e-15, wall_time: 1e-3, evaluations: 8 };
-  const whole = read({ method: "rk4", timestep: 0.004 }, values, 2);
+  const values = { error: 1e-8, sampling_error: 8e-3, error_uncertainty: 1e-15, wall_time: 1e-3, evaluations: 8 };
+  const whole = read({ method: "rk4", timestep: 0.004 }, values);
   assert.deepEqual([whole.error, whole.sampling, total(whole)], [1e-8, 8e-3, 8e-3]);
   assert.equal(errorText(whole), "1e−8 + 0.008");
   assert.deepEqual(cheapest([whole], 1e-3), [], "the hold counts: the method's own error is not all");
-  const broken = read({ method: "rk4", timestep: 0.004 }, { ...values, error: 1e136, sampling_error: 1e136 }, 5);
+  const broken = read({ method: "rk4", timestep: 0.004 }, { ...values, error: 1e136, sampling_error: 1e136, divergence: { time: 2 } });
   assert.deepEqual([broken.error, broken.sampling, broken.divergedAt], [null, null, 2]);
 });
 

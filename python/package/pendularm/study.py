@@ -62,7 +62,7 @@ class Stability:
     minimum_over_poses_bound: float | None
     """A timestep up to which every pose is stable; `None` if no useful bound is known."""
     bound_is_proven: bool
-    """Whether that bound is proven. Otherwise it depends on an estimate of gravity's effect."""
+    """Whether that bound needs no estimate of gravity's effect. It holds up to rounding."""
     certified: bool
     """Whether the bound is within 1 % of `minimum_over_poses_held`."""
     worst_pose: Floats | None
