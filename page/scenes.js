@@ -1,4 +1,4 @@
-// The 39 stiff and extreme scenes as settings of the live arm: each with its pose at the start and one sentence about its
+// The 43 stiff and extreme scenes as settings of the live arm: each with its pose at the start and one sentence about its
 // behaviour. The report reads the rows from this file, for its pictures and links, so they are JSON.
 // Invariant: the rows are those of `src/report/experiments/scenarios/`, in their order.
 
@@ -110,6 +110,19 @@ export const SCENES = [
     "settings": {"integrator": {"method": "rk4", "timestep": 0.004}}, "watch": {"seconds": 2}},
   {"id": "S39", "name": "step doubling", "links": 3, "expected": "A free swing. The report compares half steps.", "start": [0.3, -1.2, 2], "settings": {},
     "watch": {"seconds": 5}},
+  {"id": "S40", "name": "friction of a millionfold", "links": 2, "expected": "It creeps. Steps over 0.2 µs diverge.", "start": [-1.2, 0.3],
+    "settings": {"integrator": {"method": "rk4", "timestep": 2e-7}, "friction": {"viscous": [1e6, 1e6]}}, "watch": {"seconds": 0.01}},
+  {"id": "S41", "name": "a motor too weak for the arm", "links": 2, "expected": "It sinks until the load is the motor's limit.", "start": [0, 0],
+    "settings": {"controller": true, "setpoint": [0, 0], "gains": {"kp": [100, 100], "ki": [0, 50], "kd": [10, 10]}, "friction": {"viscous": [5, 1]},
+    "motors": {"effort": [10, 10], "anti_windup": "clamp", "tracking_time": 0.2}}, "watch": {"seconds": 10}},
+  {"id": "S42", "name": "between two encoder counts", "links": 2, "expected": "It goes to and fro by a count.", "start": [0, 0],
+    "settings": {"controller": true, "setpoint": [0.4939, 0.4939], "params": {"gravity": 0, "masses": [1, 1], "lengths": [1, 1]},
+    "gains": {"kp": [100, 100], "ki": [200, 200], "kd": [20, 20]}, "sensors": {"encoder_step": [0.006135923151542565, 0.006135923151542565],
+    "velocity": "exact", "delay": 0}}, "watch": {"seconds": 10}},
+  {"id": "S43", "name": "three periods late", "links": 2, "expected": "Each effort comes three periods late.", "start": [0.5, 0.8], "velocity": [1, -1],
+    "settings": {"controller": true, "setpoint": [0.5, 0.8], "params": {"gravity": 0, "masses": [1, 1], "lengths": [1, 1]}, "gains": {"kp": [0, 0],
+    "ki": [0, 0], "kd": [10, 10]}, "integrator": {"method": "rk4", "timestep": 0.004}, "sensors": {"encoder_step": [0, 0], "velocity": "exact",
+    "delay": 3}}, "watch": {"seconds": 2}},
 ];
 
 /** All settings of a scene. @param {Scene} scene @returns {Settings} */

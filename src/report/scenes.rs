@@ -17,7 +17,9 @@ use serde_json::Value;
 use crate::math::arm::{Arm, State};
 use crate::math::count::whole;
 use crate::math::integrator::Method;
+use crate::math::limits::Limits;
 use crate::math::pid::{Gains, Setpoint};
+use crate::math::sensors::Sensors;
 use crate::math::simulation::{ControlPeriod, DEFAULT_TIMESTEP};
 use crate::study::control_loop::ControlLoop;
 
@@ -27,7 +29,7 @@ const MODULE: &str = include_str!("../../page/scenes.js");
 /// A scene as settings of an arm of 2 or 3 links.
 #[derive(Debug, Clone, Deserialize)]
 pub struct LiveScene {
-    /// `S01` to `S39`.
+    /// `S01` to `S43`.
     pub id: String,
     /// Its name.
     pub name: String,
@@ -90,6 +92,8 @@ impl LiveScene {
             list(&params["masses"], *standard.masses()),
             number(&params["gravity"], standard.gravity()),
         );
+        let viscous = list(&settings["friction"]["viscous"], [0.0; N]);
+        let arm = arm.and_then(|arm| arm.with_friction(viscous));
         let arm = arm.map_err(|error| error.to_string())?;
         let control = if settings["controller"] == true {
             let (gains, standard) = (&settings["gains"], Gains::default());
@@ -104,6 +108,19 @@ impl LiveScene {
             ControlLoop::free(arm)
         };
         let (integrator, period) = (&settings["integrator"], &settings["period"]);
+        let (motors, sensors) = (&settings["motors"], &settings["sensors"]);
+        let effort = motors["effort"].as_array();
+        let control = ControlLoop {
+            limits: Limits {
+                effort: effort.map(|_| list(&motors["effort"], [0.0; N])),
+                ..Limits::default()
+            },
+            sensors: Sensors {
+                encoder_step: list(&sensors["encoder_step"], [0.0; N]),
+                ..Sensors::default()
+            },
+            ..control
+        };
         let method = integrator["method"].as_str();
         let method = method.and_then(|name| name.parse().ok());
         let timestep = number(&integrator["timestep"], DEFAULT_TIMESTEP);
@@ -112,12 +129,9 @@ impl LiveScene {
             .with_timestep(number(&self.watch["timestep"], timestep))
             .with_period(ControlPeriod {
                 period: number(&period["period"], 0.0),
-                delay: match &period["delay"] {
-                    Value::Number(delay) => delay
-                        .as_u64()
-                        .and_then(|it| it.try_into().ok())
-                        .unwrap_or(0),
-                    delay => u8::from(*delay == true),
+                delay: match sensors["delay"].as_u64() {
+                    Some(delay) => u8::try_from(delay).unwrap_or(0),
+                    None => u8::from(period["delay"] == true),
                 },
             }))
     }
@@ -152,7 +166,12 @@ fn fragment<const N: usize>(control: &ControlLoop<N>, start: &State<N>) -> Strin
     let list = |values: &[f64; N]| values.map(|value| format!("{value:?}")).join(",");
     let on_off = |on: bool| if on { "on" } else { "off" };
     let ControlLoop {
-        arm, gains, period, ..
+        arm,
+        gains,
+        period,
+        limits,
+        sensors,
+        ..
     } = control;
     let law = if control.is_free() {
         String::new()
@@ -164,7 +183,7 @@ fn fragment<const N: usize>(control: &ControlLoop<N>, start: &State<N>) -> Strin
     };
     format!(
         "links={N}&method={}&timestep={:?}&gravity={:?}&masses={}&lengths={}{law}&period={:?}&delay={}&controller={}\
-         &position={}&velocity={}",
+         &viscous={}&effort_limit={}&encoder_step={}&control_delay={}&position={}&velocity={}",
         control.method,
         control.timestep,
         arm.gravity(),
@@ -173,6 +192,13 @@ fn fragment<const N: usize>(control: &ControlLoop<N>, start: &State<N>) -> Strin
         period.period,
         on_off(period.delay > 0),
         on_off(!control.is_free()),
+        list(arm.viscous()),
+        limits
+            .effort
+            .as_ref()
+            .map_or_else(|| "none".to_owned(), list),
+        list(&sensors.encoder_step),
+        period.delay,
         list(&start.position),
         list(&start.velocity),
     )

@@ -4,9 +4,9 @@ use pendularm::report::experiments::scenarios::all;
 use pendularm::report::scenes::live_scenes;
 
 #[test]
-fn there_are_39_scenes_in_order() {
+fn there_are_43_scenes_in_order() {
     let (scenes, live) = (all(), live_scenes());
-    assert_eq!((scenes.len(), live.len()), (39, 39));
+    assert_eq!((scenes.len(), live.len()), (43, 43));
     for ((number, scene), live) in (1..).zip(&scenes).zip(live) {
         assert_eq!(scene.id, format!("S{number:02}"));
         assert_eq!(live.id, scene.id);

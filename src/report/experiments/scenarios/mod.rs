@@ -5,11 +5,12 @@
 //! late, and arms that the contract allows but a careful user would not. A scene that falls short says so. `scenes.txt`
 //! has the expectations. `page/scenes.js` has the names, and a live arm for each.
 //!
-//! **Invariant:** 39 scenes, in order, each deterministic and bounded; `slow` ones take seconds. Random values
+//! **Invariant:** 43 scenes, in order, each deterministic and bounded; `slow` ones take seconds. Random values
 //! come from a seed in the source.
 
 mod extremes;
 mod loops;
+mod real;
 mod support;
 
 pub use support::{Observation, Scenario};
@@ -23,7 +24,8 @@ pub fn all() -> Vec<Scenario> {
         let mut columns = line.split(" | ");
         let mut next = || columns.next().unwrap_or_default();
         let id = next();
-        let mut checks = loops::CHECKS.iter().chain(&extremes::CHECKS);
+        let checks = loops::CHECKS.iter().chain(&extremes::CHECKS);
+        let mut checks = checks.chain(&real::CHECKS);
         let (_, check) = checks.find(|(of, _)| *of == id)?;
         Some(Scenario {
             id,

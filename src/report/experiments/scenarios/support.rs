@@ -12,7 +12,7 @@ use crate::study::matrix::{largest, largest_difference};
 /// A named scene.
 #[derive(Debug, Clone, Copy)]
 pub struct Scenario {
-    /// `S01` to `S39`.
+    /// `S01` to `S43`.
     pub id: &'static str,
     /// The arm, its motion and its control.
     pub parameters: &'static str,
