@@ -14,6 +14,7 @@ pub mod clocks;
 pub mod continuous;
 pub mod control_loop;
 mod critical;
+pub mod encoder;
 pub(crate) mod equilibrium;
 pub mod error_estimate;
 pub mod fewest;

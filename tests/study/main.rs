@@ -15,6 +15,7 @@
 
 mod clocks;
 mod drawing;
+mod encoder;
 mod equilibrium;
 mod error;
 mod experiments;

@@ -16,6 +16,7 @@ use std::fmt;
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{gravity_load, mass_matrix};
 use crate::math::pid::{Gains, Setpoint};
+use crate::math::sensors::{Sensors, VelocitySource};
 use crate::math::simulation::{Checkpoint, ControlPeriod, Held, Memory, Simulation};
 use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
@@ -301,4 +302,27 @@ pub(super) fn boundary(guess: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
         }
     }
     None
+}
+
+/// The standard deviation of the velocities that encoders of this step \[rad\] give, from the mean velocities of their
+/// periods \[rad/s\]: both joints of a free swing of so many periods of `period` \[s\].
+pub fn velocity_noise(step: f64, period: f64, periods: u32) -> f64 {
+    let sensors = Sensors {
+        encoder_step: [step; 2],
+        velocity: VelocitySource::Difference,
+    };
+    let swing = ControlLoop::free(Arm::<2>::default()).with_timestep(period);
+    let mut swing = swing.simulation(State::at_rest([0.4, -0.3]));
+    let mut before = sensors.measured(swing.state(), None, period);
+    let squares = (0..periods).map(|_| {
+        let from = swing.state().position;
+        swing.step();
+        let now = sensors.measured(swing.state(), Some(&before), period);
+        before = now;
+        let mean = swing.state().position.iter().zip(from);
+        let mean = mean.map(|(to, from)| (to - from) / period);
+        let off = now.velocity.iter().zip(mean);
+        off.map(|(found, mean)| (found - mean).powi(2)).sum::<f64>()
+    });
+    (squares.sum::<f64>() / f64::from(2 * periods)).sqrt()
 }

@@ -8,10 +8,13 @@ use std::f64::consts::TAU;
 use super::fit::{centres, edges};
 use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
-use crate::report::experiments::measure::{STEPS, decays, growth, growth_per_period, stiffened};
-use crate::report::section::Section;
+use crate::report::experiments::measure::{
+    self, STEPS, decays, growth, growth_per_period, stiffened,
+};
+use crate::report::section::{Cell, Section, Table};
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Point, Unit, number, seconds};
 use crate::study::control_loop::ControlLoop;
+use crate::study::encoder::{largest_kd, velocity_noise};
 use crate::study::linear::Linear;
 use crate::study::stability::{
     Sampling, Stepping, largest_timestep, limit_held, limits, step_matrix,
@@ -22,6 +25,7 @@ pub(super) fn make(section: &mut Section) {
     map(section);
     regions(section);
     control_period(section);
+    encoders(section);
 }
 
 /// The limits of the default arm, by its linearised loop.
@@ -213,6 +217,45 @@ fn control_period(section: &mut Section) {
          limit of the control period is where a curve first crosses 1. From order 2 on shorter steps hardly change it. With \
          Euler the growth depends on the steps per period.",
         &panels,
+    );
+}
+
+/// The velocity noise of encoders, predicted and measured.
+fn encoders(section: &mut Section) {
+    /// Largest standard deviation of the effort for the largest kd \[N m\].
+    const EFFORT: f64 = 0.1;
+    let periods = section.choose(20_000, 2_000);
+    let mut table = Table::new(
+        "encoders",
+        "Velocity noise of an encoder, and the largest kd",
+        "The velocity is the difference of two counts over a control period of 1 ms, the joints are those of a free swing of 2 links from (0.4, -0.3). \
+         With fewer than a step per period the noise depends on the speed. The largest kd makes a noise of 0.1 N m of the effort.",
+        [
+            "bits",
+            "step",
+            "predicted [rad/s]",
+            "measured [rad/s]",
+            "largest kd [N m s/rad]",
+        ],
+    );
+    let mut furthest = 0.0_f64;
+    for bits in 10..=20_u32 {
+        let step = TAU / f64::from(1_u32 << bits);
+        let predicted = velocity_noise(step, 0.001);
+        let measured = measure::velocity_noise(step, 0.001, periods);
+        if bits >= 14 {
+            furthest = furthest.max((measured / predicted - 1.0).abs());
+        }
+        let kd = largest_kd(step, 0.001, EFFORT);
+        let cells =
+            [f64::from(bits), step, predicted, measured, kd].map(|value| Cell::new(number(value)));
+        table.rows.push(cells.into());
+    }
+    section.table(&table);
+    section.claim(
+        "Differences of counts are as noisy as predicted (within 5 % from 14 bits on)",
+        format!("furthest off {} %", number(100.0 * furthest)),
+        furthest < 0.05,
     );
 }
 
