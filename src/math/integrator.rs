@@ -53,25 +53,21 @@ impl Method {
                 name: "euler",
                 order: 1,
                 evaluations: 1,
-                max_rotation_per_step: 0.4,
             },
             Self::Midpoint => Facts {
                 name: "midpoint",
                 order: 2,
                 evaluations: 2,
-                max_rotation_per_step: 0.3,
             },
             Self::Verlet => Facts {
                 name: "verlet",
                 order: 2,
                 evaluations: 2,
-                max_rotation_per_step: 0.8,
             },
             Self::Rk4 => Facts {
                 name: "rk4",
                 order: 4,
                 evaluations: 4,
-                max_rotation_per_step: 1.25,
             },
         }
     }
@@ -93,13 +89,6 @@ impl Method {
     pub const fn evaluations(self) -> u32 {
         self.facts().evaluations
     }
-
-    /// The largest rotation of the fastest link in one step \[rad\]. With a larger one the method adds energy to the
-    /// arm. The numbers were measured; `study::motion` lists the arms.
-    #[must_use]
-    pub const fn max_rotation_per_step(self) -> f64 {
-        self.facts().max_rotation_per_step
-    }
 }
 
 /// The properties of a method.
@@ -107,7 +96,6 @@ struct Facts {
     name: &'static str,
     order: u32,
     evaluations: u32,
-    max_rotation_per_step: f64,
 }
 
 impl fmt::Display for Method {

@@ -49,26 +49,26 @@ const THIRD: f64 = 1.0 / 3.0;
 
 /// The joint accelerations of one arm, or of several side by side, with or without gravity.
 #[inline(always)] // inlined: the recursion is unrolled, and constants at both ends are folded
-pub(in crate::math) fn recursion<T: Number, const N: usize, const HAS_GRAVITY: bool>(
+pub(in crate::math) fn recursion<T: Number, const N: usize, const USES_FIRST_ANGLE: bool>(
     rods: &[Rod<T>; N],
     gravity: &T,
     q: &[T; N],
     qd: &[T; N],
     tau: &[T; N],
 ) -> [T; N] {
-    let (sin, cos) = if HAS_GRAVITY {
+    let (sin, cos) = if USES_FIRST_ANGLE {
         trig::sin_cos(q)
     } else {
         // The first angle counts as 0, and the compiler evaluates its sine and cosine itself.
         let zero = q[0].like(0.0);
         trig::sin_cos(&entries!(zero, i => if i > 0 { q[i] } else { zero }))
     };
-    recursion_along::<T, N, HAS_GRAVITY>(rods, gravity, (&sin, &cos), qd, tau)
+    recursion_along::<T, N, USES_FIRST_ANGLE>(rods, gravity, (&sin, &cos), qd, tau)
 }
 
 /// The recursion, given the sines and cosines of all angles. Without gravity the first pair is not used.
 #[inline(always)]
-pub(super) fn recursion_along<T: Number, const N: usize, const HAS_GRAVITY: bool>(
+pub(super) fn recursion_along<T: Number, const N: usize, const USES_FIRST_ANGLE: bool>(
     rods: &[Rod<T>; N],
     gravity: &T,
     (sin, cos): (&[T; N], &[T; N]),
@@ -110,7 +110,7 @@ pub(super) fn recursion_along<T: Number, const N: usize, const HAS_GRAVITY: bool
     let u3 = if N > 1 { tau[0] - tau[1] } else { tau[0] } * (rods[0].per_mass_length * 3.0);
     let free = u3 - carried.bias_y3;
     let (mut tip, mut inner);
-    if HAS_GRAVITY {
+    if USES_FIRST_ANGLE {
         let joint = Planar::new(x_axis[0].y * *gravity, x_axis[0].x * *gravity);
         let along = joint.x - w[0];
         let across = (free.sub_exact_product(joint.y, 0.5) - carried.b3 * along) * per_w[0];

@@ -21,7 +21,7 @@ use crate::math::trig;
 
 /// Computes [`super::forward_dynamics`], with or without gravity.
 #[inline(always)]
-pub(super) fn accelerations<const N: usize, const HAS_GRAVITY: bool>(
+pub(super) fn accelerations<const N: usize, const USES_FIRST_ANGLE: bool>(
     simd: Sse2,
     arm: &Arm<N>,
     q: &[f64; N],
@@ -30,7 +30,7 @@ pub(super) fn accelerations<const N: usize, const HAS_GRAVITY: bool>(
 ) -> [f64; N] {
     let zero = alone(simd, 0.0);
     let (mut sin, mut cos) = ([zero; N], [zero.like(1.0); N]);
-    let mut i = if HAS_GRAVITY { 0 } else { 1 };
+    let mut i = if USES_FIRST_ANGLE { 0 } else { 1 };
     while i + 1 < N {
         let ([sines], [cosines]) = trig::sin_cos(&[Wide::two(simd, q[i], q[i + 1])]);
         (sin[i], sin[i + 1]) = (sines, sines.upper());
@@ -44,7 +44,7 @@ pub(super) fn accelerations<const N: usize, const HAS_GRAVITY: bool>(
     let qd = entries!(zero, i => alone(simd, qd[i]));
     let tau = entries!(zero, i => alone(simd, tau[i]));
     let gravity = alone(simd, arm.gravity);
-    let found = recursion_along::<_, N, HAS_GRAVITY>(&rods, &gravity, (&sin, &cos), &qd, &tau);
+    let found = recursion_along::<_, N, USES_FIRST_ANGLE>(&rods, &gravity, (&sin, &cos), &qd, &tau);
     let mut accelerations = [0.0; N];
     for i in 0..N {
         accelerations[i] = found[i].lane(0);

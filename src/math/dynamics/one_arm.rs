@@ -34,7 +34,7 @@ pub fn weightless_dynamics<const N: usize>(
 }
 
 #[inline(always)]
-fn accelerations<const N: usize, const HAS_GRAVITY: bool>(
+fn accelerations<const N: usize, const USES_FIRST_ANGLE: bool>(
     arm: &Arm<N>,
     q: &[f64; N],
     qd: &[f64; N],
@@ -42,7 +42,7 @@ fn accelerations<const N: usize, const HAS_GRAVITY: bool>(
 ) -> [f64; N] {
     #[cfg(all(feature = "batch", target_arch = "x86_64"))]
     if let Some(simd) = fearless_simd::Level::baseline().as_sse2() {
-        return super::lane_pairs::accelerations::<N, HAS_GRAVITY>(simd, arm, q, qd, tau);
+        return super::lane_pairs::accelerations::<N, USES_FIRST_ANGLE>(simd, arm, q, qd, tau);
     }
-    recursion::<f64, N, HAS_GRAVITY>(&arm.rods, &arm.gravity, q, qd, tau)
+    recursion::<f64, N, USES_FIRST_ANGLE>(&arm.rods, &arm.gravity, q, qd, tau)
 }

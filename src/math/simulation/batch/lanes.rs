@@ -221,7 +221,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
 impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
     /// The state after the next step.
     #[inline(always)]
-    pub(super) fn next<const HAS_GRAVITY: bool, const HAS_FRICTION: bool>(
+    pub(super) fn next<const USES_FIRST_ANGLE: bool, const HAS_FRICTION: bool>(
         &self,
         method: Method,
         controlled: bool,
@@ -246,7 +246,7 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
         let (state, carry) = if method == Method::Euler {
             stepped(
                 #[inline(always)]
-                |_, q, v| self.accelerations::<HAS_GRAVITY, HAS_FRICTION>(q, v, &effort),
+                |_, q, v| self.accelerations::<USES_FIRST_ANGLE, HAS_FRICTION>(q, v, &effort),
                 Method::Euler,
                 state,
                 carry,
@@ -257,7 +257,7 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
                 apart(
                     self.timestep.token(),
                     #[inline(always)]
-                    || self.accelerations::<HAS_GRAVITY, HAS_FRICTION>(q, v, &effort),
+                    || self.accelerations::<USES_FIRST_ANGLE, HAS_FRICTION>(q, v, &effort),
                 )
             };
             stepped(shared, method, state, carry, self.timestep)
@@ -271,7 +271,7 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
     }
 
     #[inline(always)]
-    fn accelerations<const HAS_GRAVITY: bool, const HAS_FRICTION: bool>(
+    fn accelerations<const USES_FIRST_ANGLE: bool, const HAS_FRICTION: bool>(
         &self,
         q: &[Wide<S, K>; N],
         v: &[Wide<S, K>; N],
@@ -279,9 +279,9 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
     ) -> [Wide<S, K>; N] {
         if HAS_FRICTION {
             let effort = &less_friction(&self.viscous, v, effort);
-            recursion::<_, N, HAS_GRAVITY>(&self.rods, &self.gravity, q, v, effort)
+            recursion::<_, N, USES_FIRST_ANGLE>(&self.rods, &self.gravity, q, v, effort)
         } else {
-            recursion::<_, N, HAS_GRAVITY>(&self.rods, &self.gravity, q, v, effort)
+            recursion::<_, N, USES_FIRST_ANGLE>(&self.rods, &self.gravity, q, v, effort)
         }
     }
 }

@@ -72,7 +72,7 @@ impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
     }
 
     #[inline(always)]
-    fn take_steps<const HAS_GRAVITY: bool, const HAS_FRICTION: bool>(
+    fn take_steps<const USES_FIRST_ANGLE: bool, const HAS_FRICTION: bool>(
         &mut self,
         kind: StepKind,
         steps: u64,
@@ -88,7 +88,7 @@ impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
                     continue;
                 }
                 let mut next =
-                    lanes.next::<HAS_GRAVITY, HAS_FRICTION>(kind.method, kind.controlled);
+                    lanes.next::<USES_FIRST_ANGLE, HAS_FRICTION>(kind.method, kind.controlled);
                 if !Wide::<S, K>::all_finite(&next.state.position, &next.state.velocity) {
                     // This part is a separate function, so the loop's other values stay in registers.
                     let mut parted = next;

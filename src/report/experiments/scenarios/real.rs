@@ -16,7 +16,7 @@ use crate::math::simulation::ControlPeriod;
 use crate::report::experiments::measure::{LimitPair, short};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
-use crate::study::matrix::largest;
+use crate::study::matrix::{Complex, largest};
 use crate::study::stability::{Sampling, largest_timestep};
 
 /// The checks of S40 to S43.
@@ -30,7 +30,7 @@ pub(super) const CHECKS: [(&str, Check); 4] = [
 /// The fastest decay of velocities under a damping of 1 N m s/rad at each joint, in this pose \[1/s\].
 fn fastest_decay(arm: &Arm<2>, pose: [f64; 2]) -> f64 {
     let inverse = Linear::at(&ControlLoop::free(*arm), &pose, &[false; 2]).inverse_mass;
-    largest(inverse.eigenvalues().into_iter().map(|mode| mode.modulus()))
+    largest(inverse.eigenvalues().into_iter().map(Complex::modulus))
 }
 
 /// The fast mode decays at a rate `λ`, so a method of order p is stable up to the end of its interval on the real axis. Then
