@@ -15,6 +15,8 @@ __all__ = [
     "Divergence",
     "PromisedFloats",
     "Simulation",
+    "amplification",
+    "analyse_method",
     "as_doubles",
     "coriolis",
     "default_gains",
@@ -33,6 +35,7 @@ __all__ = [
     "rollout",
     "stability",
     "suggest_gains",
+    "tableau",
 ]
 
 _Floats = NDArray[np.float64]

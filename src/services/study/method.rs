@@ -84,12 +84,13 @@ fn from_fields(fields: &mut Fields<'_>) -> Option<Given> {
             return None;
         }
     };
-    let given = Given::try_from(&typed);
-    given
-        .map_err(|MethodError { field, why }| {
-            fields.refuse(field, &format_args!("is wrong: {why}"))
-        })
-        .ok()
+    match Given::try_from(&typed) {
+        Ok(given) => Some(given),
+        Err(MethodError { field, why }) => {
+            fields.refuse(field, &format_args!("is wrong: {why}"));
+            None
+        }
+    }
 }
 
 /// The coefficients of a field.
