@@ -8,6 +8,7 @@ use std::ops::RangeInclusive;
 
 use numpy::PyUntypedArray;
 use pendularm::math::integrator::{Method, UnknownMethod};
+use pendularm::math::simulation::ControlPeriod;
 use pyo3::Borrowed;
 use pyo3::exceptions::{PyOverflowError, PyValueError};
 use pyo3::intern;
@@ -384,4 +385,12 @@ pub(crate) fn links(value: Whole) -> PyResult<usize> {
 pub(crate) fn method(field: &str, name: &str) -> PyResult<Method> {
     name.parse()
         .map_err(|why| refused(format_args!("{field} {why}, got {name:?}")))
+}
+
+/// The control period, without a delay.
+pub(crate) fn read_period(period: Real) -> PyResult<ControlPeriod> {
+    Ok(ControlPeriod {
+        period: number("control_period", period, Bound::NotNegative)?,
+        delay: 0,
+    })
 }

@@ -14,6 +14,7 @@ mod fields;
 mod floats;
 mod gains;
 mod held;
+mod method;
 mod patience;
 mod simulation;
 mod state;
@@ -44,6 +45,8 @@ mod native {
     use crate::gains::default_gains;
     #[pymodule_export]
     use crate::held::held_limit;
+    #[pymodule_export]
+    use crate::method::{amplification, analyse_method, tableau};
     #[pymodule_export]
     use crate::simulation::{Divergence, Simulation};
     #[pymodule_export]

@@ -9,23 +9,24 @@ use std::time::{Duration, Instant};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, ToPyArray};
 use pendularm::math::arm::{Arm as Rods, State};
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::ControlPeriod;
 use pendularm::study::clocks::{ClockLimits, clock_limits};
 use pendularm::study::control_loop::{ControlLoop, no_control};
 use pendularm::study::gains::{GainsRequirements, search_gains};
 use pendularm::study::motion::{FREE_SECONDS, Motion};
 use pendularm::study::paused::Paused;
 use pendularm::study::planner::{self, Planned, Task};
-use pendularm::study::rollout::{Rollout, RolloutRequest, rollout as rollout_of};
+use pendularm::study::rollout::{Rollout, RolloutRequest, rollout_by};
 use pendularm::study::stability::{Limits, search_limits};
+use pendularm::study::tableau::Pair;
 use pyo3::prelude::{FromPyObject, PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
 use crate::arm::{Given, for_either, or_default};
 use crate::arrays::{joints_or, room};
-use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
+use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, read_period, refused};
 use crate::floats::Promised;
 use crate::gains;
+use crate::method::Tableau;
 use crate::patience::until_done;
 
 // ---- stability ------------------------------------------------------------------------------------------------------
@@ -103,14 +104,6 @@ fn listed_limits<'py, const N: usize>(
     Ok(found)
 }
 
-/// The control period, without a delay.
-fn read_period(period: Real) -> PyResult<ControlPeriod> {
-    Ok(ControlPeriod {
-        period: fields::number("control_period", period, Bound::NotNegative)?,
-        delay: 0,
-    })
-}
-
 fn read_state<const N: usize>(
     (q, position): (&str, Option<&Object<'_>>),
     (qd, velocity): (&str, Option<&Object<'_>>),
@@ -138,6 +131,7 @@ pub(crate) struct RolloutArguments<'py> {
     samples: Whole,
     reference: Flag,
     control_period: Real,
+    tableau: Option<Tableau>,
 }
 
 #[pyfunction]
@@ -153,8 +147,10 @@ pub(crate) fn rollout<'py>(
     let reference = arguments.reference.read("reference")?;
     let period = read_period(arguments.control_period)?;
     let method = arguments.integrator.method("integrator")?;
+    let own = arguments.tableau.map(Tableau::read).transpose()?;
+    let own = own.map(|given| given.pair().clone());
     for_either!(or_default(arguments.arm)?, arm => {
-        run(py, RolloutRequest {
+        run(py, own, RolloutRequest {
             control: read_loop(arm, arguments.gains.as_ref(), arguments.setpoint.as_ref())?
                 .with_method(method)
                 .with_timestep(timestep)
@@ -168,17 +164,22 @@ pub(crate) fn rollout<'py>(
 }
 
 /// Makes the run alone, which is timed, and repeats it beside its reference, if one is requested.
-fn run<const N: usize>(py: Python<'_>, request: RolloutRequest<N>) -> PyResult<Held<'_, PyDict>> {
+fn run<const N: usize>(
+    py: Python<'_>,
+    own: Option<Pair>,
+    request: RolloutRequest<N>,
+) -> PyResult<Held<'_, PyDict>> {
     let steps = request.steps().map_err(refused)?;
     // More memory than two runs and the answer need. It is checked first, because the run's vectors
     // abort without memory.
     let samples = usize::try_from(request.samples.min(steps + 1)).unwrap_or(usize::MAX);
     drop(room::<[f64; 80]>(samples)?);
     let mut took = Duration::ZERO;
-    let mut alone = Paused::new(rollout_of(RolloutRequest {
+    let alone = RolloutRequest {
         reference: false,
         ..request
-    }));
+    };
+    let mut alone = Paused::new(rollout_by(alone, own.clone()));
     let mut made = until_done(py, || {
         let began = Instant::now();
         let made = alone.advance();
@@ -186,7 +187,7 @@ fn run<const N: usize>(py: Python<'_>, request: RolloutRequest<N>) -> PyResult<H
         made
     })?;
     if request.reference {
-        let mut compared = Paused::new(rollout_of(request));
+        let mut compared = Paused::new(rollout_by(request, own));
         made = until_done(py, || compared.advance())?;
     }
     listed_run(py, &made.map_err(refused)?, took)
@@ -282,6 +283,7 @@ pub(crate) struct PlanArguments<'py> {
     gains: Option<Object<'py>>,
     setpoint: Option<Object<'py>>,
     control_period: Real,
+    tableau: Option<Tableau>,
 }
 
 #[pyfunction]
@@ -293,15 +295,18 @@ pub(crate) fn plan<'py>(
     let _floats = Promised::begin();
     let error = fields::number("error", arguments.error, Bound::Positive)?;
     let period = read_period(arguments.control_period)?;
+    let own = arguments.tableau.map(Tableau::read).transpose()?;
+    let own = own.map(|given| given.pair().clone());
     for_either!(or_default(arguments.arm)?, arm => {
         let control = read_loop(arm, arguments.gains.as_ref(), arguments.setpoint.as_ref())?.with_period(period);
         let usual = if control.is_free() { 10.0 } else { 4.0 };
-        let mut planning = Paused::new(planner::plan(Task {
+        let task = Task {
             control,
             start: read_state(("q0", arguments.q0.as_ref()), ("qdot0", arguments.qdot0.as_ref()))?,
             duration: fields::number("duration", arguments.duration.unwrap_or(Real::Is(usual)), Bound::Positive)?,
             error,
-        }));
+        };
+        let mut planning = Paused::new(planner::plan_beside(task, own));
         let planned = until_done(py, || planning.advance())?.map_err(refused)?;
         listed_plan(py, &planned, (!control.is_free()).then_some(period.period))
     })
@@ -353,5 +358,9 @@ fn listed_plan<'py>(
     found.set_item("timesteps", timesteps)?;
     found.set_item("evaluations", evaluations)?;
     found.set_item("errors", errors)?;
+    let own = planned
+        .own
+        .map(|own| (own.timestep, own.evaluations, own.error));
+    found.set_item("own", own)?;
     Ok(found)
 }

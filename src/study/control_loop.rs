@@ -11,6 +11,7 @@ use crate::math::limits::Limits;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::sensors::Sensors;
 use crate::math::simulation::{ControlPeriod, DEFAULT_TIMESTEP, Simulation};
+use crate::math::simulation::{Held, Hold, Memory};
 
 /// An arm with its control law, method, timestep and control period.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,6 +135,18 @@ impl<const N: usize> ControlLoop<N> {
         simulation.set_setpoint(self.setpoint);
         simulation.enable(!self.is_free());
         simulation
+    }
+}
+
+impl<const N: usize> ControlLoop<N> {
+    /// What the loop holds between two runs of its law, at the start.
+    pub(super) fn hold(&self) -> Hold<N> {
+        let held = Held {
+            period: self.period,
+            ..Held::default()
+        };
+        let sensors = (self.sensors, Memory::default());
+        Hold::new(held, self.limits, sensors, self.timestep)
     }
 }
 

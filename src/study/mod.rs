@@ -25,6 +25,7 @@ pub mod linear;
 pub mod matrix;
 pub mod method;
 pub mod motion;
+mod own_run;
 pub mod paused;
 pub mod planner;
 mod poses;

@@ -23,9 +23,12 @@ use super::clocks::clock_limits;
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
 use super::fewest::{StepTrial, fewest};
-use super::limits;
+use super::limits::{self, ADVISED_PART};
+use super::method::loop_limits;
+use super::own_run::OwnRun;
 use super::paused::pause;
 use super::rollout;
+use super::tableau::Pair;
 use crate::math::arm::State;
 use crate::math::count::{self, in_f64};
 use crate::math::integrator::Method;
@@ -44,6 +47,9 @@ const MAX_STEPS: u64 = 4_000_000;
 /// Uncertainty of the reference, relative to the allowed error: the wanted one, so that few steps are too many, and the
 /// largest.
 const PART_OF_REFERENCE: [f64; 2] = [0.001, 0.05];
+
+/// Most evaluations of a run of one's own method, relative to the cheapest run.
+pub const OWN_COST: u64 = 16;
 
 /// The motion to be planned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,6 +87,9 @@ pub struct Planned {
     pub candidates: Vec<Candidate>,
     /// Uncertainty of the reference \[m\].
     pub uncertainty: f64,
+    /// The cheapest run found of a method of one's own. `None` if it costs more than [`OWN_COST`] times the best. Its
+    /// `method` is that of the task, and has no effect.
+    pub own: Option<Candidate>,
 }
 
 /// Why there is no plan.
@@ -125,6 +134,17 @@ pub enum PlanError {
 /// # Errors
 /// The reason why there is no plan.
 pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
+    plan_beside(task, None).await
+}
+
+/// The same, and the cheapest run of a method of one's own beside it.
+///
+/// # Errors
+/// The reason why there is no plan.
+pub async fn plan_beside<const N: usize>(
+    task: Task<N>,
+    own: Option<Pair>,
+) -> Result<Planned, PlanError> {
     if task.duration.is_nan() || task.duration > MAX_DURATION {
         return Err(PlanError::TooLong(task.duration));
     }
@@ -158,6 +178,7 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
         let mut trials = MethodTrials {
             reference: &reference,
             control,
+            own: None,
             best: None,
         };
         fewest(least, affordable, u64::MAX, &mut trials).await;
@@ -170,17 +191,55 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     } else {
         PlanError::TooManySteps(longest_stable)
     };
+    let best = *candidates.last().ok_or(none)?;
     Ok(Planned {
-        best: *candidates.last().ok_or(none)?,
+        own: match own {
+            Some(pair) => own_run(&reference, pair, best.evaluations).await,
+            None => None,
+        },
+        best,
         candidates,
         uncertainty: reference.uncertainty,
     })
+}
+
+/// The cheapest run found of a method of one's own. Under control its timestep is at most a part of the limit near the
+/// equilibrium, or the limit at a given period.
+async fn own_run<const N: usize>(
+    reference: &Reference<N>,
+    pair: Pair,
+    cheapest: u64,
+) -> Option<Candidate> {
+    let control = reference.task.control;
+    let most = if control.is_free() {
+        None
+    } else {
+        let (held, at_period) = loop_limits(&control, &pair).await;
+        let advised = held.map(|limit| ADVISED_PART * limit);
+        let is_given = control.given_period() > 0.0;
+        if is_given { at_period } else { advised }
+    };
+    let most = most.unwrap_or(f64::INFINITY);
+    let least = count::whole((reference.whole / most * (1.0 - count::ROUNDING)).ceil());
+    let each = u64::try_from(pair.evaluations()).unwrap_or(u64::MAX);
+    let steps = OWN_COST.saturating_mul(cheapest) / each.max(1);
+    let mut trials = MethodTrials {
+        reference,
+        control,
+        own: Some(pair),
+        best: None,
+    };
+    let affordable = steps.min(MAX_STEPS) / reference.count;
+    fewest(least, affordable, u64::MAX, &mut trials).await;
+    trials.best
 }
 
 /// Runs of one method.
 struct MethodTrials<'a, const N: usize> {
     reference: &'a Reference<N>,
     control: ControlLoop<N>,
+    /// A method in place of the loop's.
+    own: Option<Pair>,
     /// The last run that was accurate enough.
     best: Option<Candidate>,
 }
@@ -194,15 +253,25 @@ impl<const N: usize> StepTrial for &mut MethodTrials<'_, N> {
             return false;
         }
         let control = self.control.with_timestep(timestep);
-        let live = Box::new(control.simulation(reference.task.start));
+        let start = reference.task.start;
+        let (run, each): (Box<dyn Steppable<N>>, _) = match &self.own {
+            Some(pair) => (
+                Box::new(OwnRun::new(control, pair.clone(), start)),
+                u64::try_from(pair.evaluations()).unwrap_or(u64::MAX),
+            ),
+            None => (
+                Box::new(control.simulation(start)),
+                u64::from(method.evaluations()),
+            ),
+        };
         let allowed = reference.task.error - reference.uncertainty;
-        let error = reference.off_by(live, steps, allowed).await;
+        let error = reference.off_by(run, steps, allowed).await;
         let is_enough = error + reference.uncertainty <= reference.task.error;
         if is_enough {
             self.best = Some(Candidate {
                 method,
                 timestep,
-                evaluations: steps * reference.count * u64::from(method.evaluations()),
+                evaluations: steps * reference.count * each,
                 error,
             });
         }

@@ -1,8 +1,9 @@
 //! An offline run of the arm, sample by sample, with its error against a reference.
 //!
-//! The run is the live loop, [`Simulation`], from any state. Its reference has the same control law, evaluated at the
-//! same instants and held for the same period. In between it follows the arm to rounding ([`TaylorReference`]). The
-//! difference is therefore the error of the method alone. [`Rollout::from_ideal`] has the error of the held effort too.
+//! The run is the live loop, [`Simulation`](crate::math::simulation::Simulation), from any state, or the same loop by a
+//! method of one's own. Its reference has the same control law, evaluated at the same instants and held for the same
+//! period. In between it follows the arm to rounding ([`TaylorReference`]). The difference is therefore the error of the
+//! method alone. [`Rollout::from_ideal`] has the error of the held effort too.
 //!
 //! Three more references estimate the uncertainty of the first. Their arms differ in the last digits, and one of them
 //! takes steps half as long. On a chaotic swing the reference is usable for some twenty seconds. All errors are along
@@ -16,7 +17,9 @@ use super::beside::Steppable;
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
 use super::matrix::{largest, largest_difference};
+use super::own_run::{OwnRun, Recorded};
 use super::paused::{PieceWork, at_once};
+use super::tableau::Pair;
 use super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
 use crate::math::count::{in_f64, steps_in, whole};
@@ -24,7 +27,7 @@ use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
 use crate::math::pid::Pid;
 use crate::math::shown::{Shown, shown_against};
-use crate::math::simulation::{Divergence, Held, Hold, Memory, Simulation};
+use crate::math::simulation::{Divergence, Hold};
 
 /// Most steps of one run: a few seconds of one core, or up to two minutes with a reference under control.
 pub const MAX_STEPS: u64 = 10_000_000;
@@ -182,11 +185,25 @@ pub const fn most_bytes<const N: usize>() -> usize {
 pub async fn rollout<const N: usize>(
     request: RolloutRequest<N>,
 ) -> Result<Rollout<N>, RolloutError> {
+    rollout_by(request, None).await
+}
+
+/// The same with a method of one's own, if there is one, in place of the loop's.
+///
+/// # Errors
+/// The reason of [`RolloutRequest::steps`].
+pub async fn rollout_by<const N: usize>(
+    request: RolloutRequest<N>,
+    own: Option<Pair>,
+) -> Result<Rollout<N>, RolloutError> {
     let RolloutRequest { control, start, .. } = request;
     let steps = request.steps()?;
     let samples = request.samples.min(steps + 1);
     let intervals = samples.saturating_sub(1).max(1);
-    let mut run = control.simulation(start);
+    let mut run: Box<dyn Recorded<N>> = match own {
+        Some(pair) => Box::new(OwnRun::new(control, pair, start)),
+        None => Box::new(control.simulation(start)),
+    };
     // On the heap, so that a run that has not begun has no memory for them.
     let references = |index| Reference::new(&control, start, index);
     let mut references: Option<Box<[Reference<N>; REFERENCES]>> = request
@@ -206,18 +223,19 @@ pub async fn rollout<const N: usize>(
         whole(MAX_SPAN / control.timestep).clamp(1, 1000)
     };
     let mut piece = PieceWork::default();
-    let evaluations = u64::from(control.method.evaluations());
+    let mut counted = 0;
     for index in 0..samples {
         // The step nearest to the sample, for evenly spaced samples. The product is at most 1e5 times 1e7.
         let due = (2 * index * steps + intervals) / (2 * intervals);
         while run.steps() < due && run.divergence().is_none() {
             let ahead = due - run.steps();
             let taken = run.advance(ahead.min(stride));
-            piece.spend(taken * evaluations).await;
+            let before = std::mem::replace(&mut counted, run.evaluations());
+            piece.spend(counted - before).await;
             for reference in references.as_deref_mut().into_iter().flatten() {
                 reference.follow(taken, &mut piece).await;
             }
-            let is_limited = run.at_limit().contains(&true);
+            let is_limited = run.is_at_limit();
             for ideal in ideals.iter_mut().flatten() {
                 ideal.run.take_if(|_| is_limited);
                 ideal.follow(taken, &mut piece).await;
@@ -226,10 +244,10 @@ pub async fn rollout<const N: usize>(
         if run.divergence().is_some() {
             break;
         }
-        made.sample(&run, references.as_deref(), ideals.as_ref());
+        made.sample(&control.arm, &*run, references.as_deref(), ideals.as_ref());
     }
     made.steps = run.steps();
-    made.evaluations = run.steps() * evaluations;
+    made.evaluations = run.evaluations();
     made.divergence = run.divergence();
     Ok(made)
 }
@@ -237,7 +255,8 @@ pub async fn rollout<const N: usize>(
 impl<const N: usize> Rollout<N> {
     fn sample(
         &mut self,
-        run: &Simulation<N>,
+        arm: &Arm<N>,
+        run: &dyn Recorded<N>,
         references: Option<&[Reference<N>; REFERENCES]>,
         ideals: Option<&[Ideal<N>; 2]>,
     ) {
@@ -245,8 +264,8 @@ impl<const N: usize> Rollout<N> {
         self.times.push(run.time());
         self.positions.push(state.position);
         self.velocities.push(state.velocity);
-        self.efforts.push(*run.effort());
-        self.energy.push(energy(run.arm(), state));
+        self.efforts.push(run.effort());
+        self.energy.push(energy(arm, state));
         let last_digit = f64::EPSILON * largest(state.position.iter().map(|q| q.abs())).max(1.0);
         if let (Some(deviation), Some(references)) = (&mut self.deviation, references)
             && references.iter().all(|one| !one.is_lost)
@@ -335,20 +354,11 @@ pub(super) struct Reference<const N: usize> {
 impl<const N: usize> Reference<N> {
     /// One of several references of a loop, which differ by rounding.
     pub(super) fn new(control: &ControlLoop<N>, start: State<N>, index: usize) -> Self {
-        let held = Held {
-            period: control.period,
-            ..Held::default()
-        };
         Self {
             arm: neighbour(&control.arm, index),
             taylor: TaylorReference::new(start).cut(if index == 1 { 2 } else { 1 }),
             pid: control.simulation(start).pid().clone(),
-            hold: Hold::new(
-                held,
-                control.limits,
-                (control.sensors, Memory::default()),
-                control.timestep,
-            ),
+            hold: control.hold(),
             timestep: control.timestep,
             spans: 0,
             is_lost: false,

@@ -49,7 +49,7 @@ const SEARCH_FINE: f64 = 0.1;
 /// Factor between the timesteps of the search beyond. It may miss an unstable interval that is narrower.
 const SEARCH_STEP: f64 = 1.05;
 
-/// End of the search. No limit of the explicit methods exceeds 3.
+/// End of the search, in the same units. No limit of the explicit methods exceeds 3.
 const SEARCH_END: f64 = 30.0;
 
 /// When the control law is evaluated.
@@ -110,6 +110,16 @@ impl Modes {
     pub(super) fn growth(&self) -> f64 {
         let growth = self.eigenvalues.iter().map(|mode| mode.re);
         growth.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// A period \[s\] far above the slowest time constant of the modes that are not [`DOUBTFUL`], and above that of the
+    /// fastest mode in each of the `steps`.
+    pub(super) fn long(&self, steps: u32) -> f64 {
+        let rates = self.eigenvalues.iter().map(|mode| mode.modulus());
+        let slowest = rates
+            .filter(|it| *it >= DOUBTFUL * self.rate)
+            .fold(self.rate / f64::from(steps), f64::min);
+        SEARCH_END / slowest
     }
 
     /// The number of modes that are [`DOUBTFUL`] and do not clearly decay.
@@ -302,6 +312,15 @@ pub(super) fn repeated(step: &Matrix, h: f64, substeps: u32) -> Matrix {
 /// Increases the period \[s\] from far below the fastest time constant to the first unstable one, then bisects. `growth`
 /// is that of a period, as of [`growth`]. A piece has one evaluation of it.
 pub(super) async fn first_unstable(modes: &Modes, growth: impl Fn(f64) -> f64) -> Option<f64> {
+    first_unstable_until(modes, SEARCH_END / modes.rate, growth).await
+}
+
+/// The same up to the period `end` \[s\].
+pub(super) async fn first_unstable_until(
+    modes: &Modes,
+    end: f64,
+    growth: impl Fn(f64) -> f64,
+) -> Option<f64> {
     let rate = modes.rate;
     if rate == 0.0 {
         return None;
@@ -325,7 +344,7 @@ pub(super) async fn first_unstable(modes: &Modes, growth: impl Fn(f64) -> f64) -
         };
     }
     let mut stable = start;
-    while stable * rate < SEARCH_END {
+    while stable < end {
         let step = if stable * rate < SEARCH_FINE {
             2.0
         } else {

@@ -63,9 +63,27 @@ pub enum TableauError {
     /// A coefficient is not finite, or too large.
     #[error("a coefficient must be between -{LARGEST} and {LARGEST}, got {0}")]
     Coefficient(f64),
+    /// There is not one entry for each stage.
+    #[error("{name} must have {stages} entries, one for each stage, got {got}")]
+    Entries {
+        /// The list.
+        name: &'static str,
+        /// The number of stages.
+        stages: usize,
+        /// Its number of entries.
+        got: usize,
+    },
     /// The tableaus of positions and velocities have different numbers of stages.
     #[error("the tableaus of q and v must have equally many stages, got {0} and {1}")]
     Pair(usize, usize),
+}
+
+/// A coefficient that is typed as a number or as a fraction, such as `1/3`. `None` if it is neither, or not finite.
+pub fn coefficient(text: &str) -> Option<f64> {
+    let number = |part: &str| part.trim().parse().ok().filter(|it: &f64| it.is_finite());
+    let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
+    let value = number(numerator)? / number(denominator)?;
+    value.is_finite().then_some(value)
 }
 
 impl Tableau {

@@ -349,6 +349,45 @@ fn the_limits_of_one_joint_have_closed_forms() {
     assert_eq!(answer(&joint(100.0, -1.0), None).period_limit, Some(0.0));
 }
 
+/// A light joint with much damping of its own is fast, and stable at long periods. It does not hide the limit of a slow
+/// joint, nor its own.
+#[test]
+fn a_fast_joint_that_limits_nothing_ends_no_search() {
+    let light = |kp: f64, kd: f64| Given {
+        damping: vec![vec![10.0]],
+        kp: vec![vec![kp]],
+        kd: vec![vec![kd]],
+        ..given(vec![vec![1e-4]])
+    };
+    let (slow, own) = (joint(25.0, 10.0), light(1.0, 0.0));
+    let both = Given {
+        kp: vec![vec![25.0, 1.0]],
+        kd: vec![vec![10.0, 0.0]],
+        damping: vec![vec![0.0, 10.0]],
+        ..given(vec![vec![1.0, 0.0], vec![0.0, 1e-4]])
+    };
+    let limit = |given: &Given| answer(given, None).period_limit.unwrap();
+    for between in [Between::Exact, Between::Implicit] {
+        let of = |one: &Given| Given {
+            between: between.clone(),
+            ..one.clone()
+        };
+        let (alone, both) = (limit(&of(&slow)), limit(&of(&both)));
+        assert!(is_near(both, alone, 1e-9), "{both} {alone}");
+        // The velocity is that of the effort at once: x ↦ (1 - T kp / D) x.
+        let own = limit(&of(&own));
+        assert!(is_near(own, 20.0, 1e-4), "{own}");
+    }
+    // Each of many short steps is stable up to 2.7853 time constants of the joint's own damping.
+    let many = Given {
+        between: explicit(Method::Rk4),
+        steps: 1000,
+        ..light(1e-6, 0.0)
+    };
+    let end = limit(&many);
+    assert!(is_near(end, 2.7853e-5 * 1000.0, 1e-4), "{end}");
+}
+
 /// The first message of isaac-sim/IsaacLab 2497: kd 0.5 at 4 ms needs an inertia of 0.001 kg m².
 #[test]
 fn a_gain_that_is_too_large_is_named_with_the_inertia_that_it_needs() {

@@ -7,7 +7,7 @@ use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::method::{Analysis, Given, NAMES, amplification, analyse, measure, named};
 use pendularm::study::paused::at_once;
 use pendularm::study::stability::limit_held;
-use pendularm::study::tableau::{Pair, Tableau};
+use pendularm::study::tableau::{Pair, Tableau, coefficient};
 
 fn control() -> ControlLoop<2> {
     ControlLoop::new(Arm::default(), Gains::default(), Setpoint::at([0.0; 2]))
@@ -113,7 +113,7 @@ fn the_limit_on_the_arm_and_the_region_are_those_of_the_arms_own_methods() {
     let rk4 = analysis(rk4(|_, _| ()));
     let own = limit_held(&control().with_method(Method::Rk4)).unwrap();
     assert!(
-        (rk4.timestep_limit.unwrap() / own - 1.0).abs() < 1e-6,
+        (rk4.timestep_limit_held.unwrap() / own - 1.0).abs() < 1e-6,
         "{rk4:?}, not {own}"
     );
     let pair = Pair::of(Method::Rk4);
@@ -134,6 +134,23 @@ fn the_limit_on_the_arm_and_the_region_are_those_of_the_arms_own_methods() {
 }
 
 #[test]
+fn a_coefficient_is_a_number_or_a_fraction() {
+    for (text, value) in [
+        ("1/3", 1.0 / 3.0),
+        (" -2 / 3 ", -2.0 / 3.0),
+        ("0.25", 0.25),
+        ("0/5", 0.0),
+    ] {
+        assert_eq!(coefficient(text), Some(value), "{text}");
+    }
+    for text in [
+        "1/0", "0/0", "", "/", "1/", "1/2/3", "inf", "1/inf", "nan", "1e999", "one",
+    ] {
+        assert_eq!(coefficient(text), None, "{text}");
+    }
+}
+
+#[test]
 fn a_bad_tableau_is_refused_with_its_row() {
     let refusal = |a: &[Vec<f64>], b: &[f64]| Tableau::new(a, b).unwrap_err().to_string();
     assert_eq!(
@@ -147,6 +164,13 @@ fn a_bad_tableau_is_refused_with_its_row() {
     );
     assert!(refusal(&[vec![]], &[f64::NAN]).starts_with("a coefficient must be between"));
     let euler = textbook("euler");
-    assert!(euler.clone().with_times(&[0.0, 1.0]).is_err());
+    assert_eq!(
+        euler
+            .clone()
+            .with_times(&[0.0, 1.0])
+            .unwrap_err()
+            .to_string(),
+        "c must have 1 entries, one for each stage, got 2"
+    );
     assert!(euler.with_embedded(&[f64::INFINITY]).is_err());
 }

@@ -9,6 +9,7 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::beside::largest_distance;
 use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::method::named;
 use pendularm::study::paused::at_once;
 use pendularm::study::planner::{self, Candidate, MAX_DURATION, PlanError, Planned, Task};
 
@@ -204,4 +205,36 @@ fn the_text_of_a_plan_has_short_numbers() {
     })
     .unwrap();
     assert!(text.contains("control period 2.0000e-3 s"), "{text}");
+}
+
+/// The plan of a method of one's own is measured beside the others. Its own tableau costs Runge-Kutta 4 the same.
+#[test]
+fn a_method_of_ones_own_is_planned_beside_the_arms() {
+    let beside = |task: Task<2>, name| {
+        let pair = named(name).unwrap().pair().clone();
+        at_once(planner::plan_beside(task, Some(pair))).unwrap()
+    };
+    let falling = |error| falling(Arm::default(), 2.0, error);
+    let held = gains([200.0, 100.0], [20.0, 10.0], [30.0, 12.0]);
+    let (moving, _) = moving(held, [1.0, -0.5], 2.0, 0.01);
+    for task in [falling(1e-6), moving] {
+        let planned = beside(task, "rk4");
+        let is_rk4 = |one: &&Candidate| one.method == Method::Rk4;
+        let alone = planned.candidates.iter().find(is_rk4);
+        let own = planned.own.unwrap();
+        assert!(own.error <= task.error, "{planned:?}");
+        // Under control both timesteps are a part of a limit, over all poses or at the setpoint.
+        if let Some(alone) = alone.filter(|_| task.control.is_free()) {
+            let ratio = own.evaluations as f64 / alone.evaluations as f64;
+            assert!((ratio - 1.0).abs() < 0.02, "{planned:?}");
+        }
+        let without = at_once(planner::plan(task)).unwrap();
+        assert_eq!((without.best, without.own), (planned.best, None));
+    }
+    let five = beside(falling(1e-9), "dormand_prince5");
+    assert!(
+        five.own.unwrap().evaluations < five.best.evaluations,
+        "{five:?}"
+    );
+    assert_eq!(beside(falling(1e-6), "euler").own, None);
 }

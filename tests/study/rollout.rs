@@ -4,10 +4,13 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
 use pendularm::math::integrator::{Method, increment};
 use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::ControlPeriod;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::estimate;
+use pendularm::study::method::named;
 use pendularm::study::paused::{Paused, at_once};
-use pendularm::study::rollout::{MAX_SAMPLES, Rollout, RolloutRequest, rollout};
+use pendularm::study::rollout::{MAX_SAMPLES, Rollout, RolloutRequest, rollout, rollout_by};
+use pendularm::study::tableau::Pair;
 use pendularm::study::taylor::TaylorReference;
 
 use crate::stored::gains;
@@ -39,6 +42,72 @@ fn controlled(gains: Gains<2>, timestep: f64) -> RolloutRequest<2> {
 
 fn run<const N: usize>(request: RolloutRequest<N>) -> Rollout<N> {
     at_once(rollout(request)).unwrap()
+}
+
+/// The live arm's methods by their tableaus take its steps, but for rounding.
+#[test]
+fn a_method_of_ones_own_steps_the_live_arms_loop() {
+    let mut late = reach();
+    late.control.arm = late.control.arm.with_friction([0.5, 0.2]).unwrap();
+    late.control.period = ControlPeriod {
+        period: 0.02,
+        delay: 2,
+    };
+    late.control.limits.effort = Some([40.0, 1e3]);
+    for (method, request) in Method::ALL
+        .into_iter()
+        .flat_map(|method| [swing(), reach(), late].map(|request| (method, request)))
+    {
+        let control = request.control.with_method(method);
+        let request = RolloutRequest { control, ..request };
+        let own = at_once(rollout_by(request, Some(Pair::of(method)))).unwrap();
+        let live = run(request);
+        assert_eq!(
+            (&own.times, own.evaluations),
+            (&live.times, live.evaluations)
+        );
+        let pairs = [
+            (&own.positions, &live.positions),
+            (&own.efforts, &live.efforts),
+        ];
+        for (one, other) in pairs
+            .into_iter()
+            .flat_map(|(one, other)| one.iter().zip(other))
+        {
+            let is_near =
+                |(one, other): (&f64, &f64)| (one - other).abs() < 1e-9 * (1.0 + other.abs());
+            assert!(
+                one.iter().zip(other).all(is_near),
+                "{method}: {one:?} {other:?}"
+            );
+        }
+    }
+    let euler = Some(Pair::of(Method::Euler));
+    let wild = RolloutRequest {
+        duration: 1000.0,
+        ..controlled(gains([1e5; 2], [0.0; 2], [1e4; 2]), 0.01)
+    };
+    let end = |run: Rollout<2>| run.divergence.unwrap().step;
+    let live = run(RolloutRequest {
+        control: wild.control.with_method(Method::Euler),
+        ..wild
+    });
+    assert_eq!(end(at_once(rollout_by(wild, euler)).unwrap()), end(live));
+}
+
+/// A method of order 5 is more accurate than one of order 4 at the same timestep.
+#[test]
+fn a_method_of_ones_own_has_its_error() {
+    let by = |name| {
+        let pair = named(name).unwrap().pair().clone();
+        at_once(rollout_by(swing(), Some(pair))).unwrap()
+    };
+    let (four, five) = (by("rk4"), by("dormand_prince5"));
+    let error = |run: &Rollout<2>| run.deviation.unwrap().known().unwrap();
+    let live = error(&run(swing()));
+    assert!((error(&four) / live - 1.0).abs() < 1e-3, "{live}");
+    assert!(error(&five) < 0.1 * live, "{} {live}", error(&five));
+    assert_eq!((four.evaluations, five.evaluations), (400, 600));
 }
 
 /// A run has the number of steps nearest to its duration, and its samples are at the nearest steps too.

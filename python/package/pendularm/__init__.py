@@ -13,9 +13,10 @@ from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effe
 from ._page import Page, page
 from ._ray import RayExecutor
 from .held import HeldLimit, HeldMode, held_limit
+from .method import Method, MethodAnalysis
 from .report import read_report
 from .scores import score, submission
-from .study import Critical, Plan, Rollout, Stability, SuggestedGains, plan, rollout, stability, suggest_gains
+from .study import Critical, OwnPlan, Plan, Rollout, Stability, SuggestedGains, plan, rollout, stability, suggest_gains
 from .sweep import Run, Sweep, sweep
 
 __version__ = _version("pendularm")
@@ -27,6 +28,9 @@ __all__ = [
     "Divergence",
     "HeldLimit",
     "HeldMode",
+    "Method",
+    "MethodAnalysis",
+    "OwnPlan",
     "Page",
     "Plan",
     "RayExecutor",

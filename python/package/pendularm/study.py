@@ -5,16 +5,21 @@ Long computations release the interpreter's lock, and Ctrl-C ends them. An answe
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from ._fields import Floats
+from ._fields import Floats, shown
 from ._native import Arm
+
+if TYPE_CHECKING:
+    from .method import Method
 
 __all__ = [
     "Critical",
+    "OwnPlan",
     "Plan",
     "Rollout",
     "Stability",
@@ -111,6 +116,17 @@ class Rollout:
     """Step and time [s] of a divergence, if there was one. The samples end before it."""
 
 
+class OwnPlan(NamedTuple):
+    """The cheapest run found of a method of one's own within the error."""
+
+    timestep: float
+    """[s]."""
+    evaluations: int
+    """Number of evaluations of the dynamics."""
+    error: float
+    """Largest error of the end effector [m]."""
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """The cheapest method and timestep within an allowed error, and the cost of the other methods."""
@@ -131,6 +147,8 @@ class Plan:
     timesteps: Floats
     evaluations: NDArray[np.uint64]
     errors: Floats
+    own: OwnPlan | None
+    """The run by `method`; `None` without one, or if it costs over 16 times as much as the plan."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +169,13 @@ class SuggestedGains:
     """This limit divided by the timestep."""
     settled_after: float
     """Settling time of the slowest of ten moves [s]."""
+
+
+def _tableau(name: str, method: Any) -> dict[str, Any] | None:
+    found: dict[str, Any] | None = getattr(method, "_tableau", None)
+    if method is not None and found is None:
+        raise ValueError(f"{name} must be a Method, got {shown(method)}")
+    return found
 
 
 def suggest_gains(
@@ -198,7 +223,7 @@ def rollout(
     qdot0: ArrayLike | None = None,
     duration: float = 10.0,
     timestep: float = 0.001,
-    integrator: str = "rk4",
+    integrator: "str | Method" = "rk4",
     gains: Mapping[str, ArrayLike | None] | SuggestedGains | None = None,
     setpoint: ArrayLike | None = None,
     samples: int = 1001,
@@ -211,9 +236,12 @@ def rollout(
     to the nearest number of timesteps. The result has `samples`, including start and end, or every step if there are
     fewer. Without `gains` the arm is free, and a `setpoint` is refused. With
     `reference` the run is compared with the true motion under the same held control law, and with the loop whose law
-    acts at every instant. The law runs once per `control_period` [s], 0 for every step.
+    acts at every instant. The law runs once per `control_period` [s], 0 for every step. `integrator` may be a `Method`.
     """
-    return Rollout(**_native.rollout(locals()))
+    arguments = locals() | {"tableau": getattr(integrator, "_tableau", None)}
+    if arguments["tableau"] is not None:
+        arguments["integrator"] = "rk4"
+    return Rollout(**_native.rollout(arguments))
 
 
 def plan(
@@ -226,6 +254,7 @@ def plan(
     gains: Mapping[str, ArrayLike | None] | SuggestedGains | None = None,
     setpoint: ArrayLike | None = None,
     control_period: float = 0.0,
+    method: "Method | None" = None,
 ) -> Plan:
     """Finds the method and timestep that keep the end effector within `error` [m] at least cost, as ``/study/plan``
     does.
@@ -233,6 +262,8 @@ def plan(
     Without `gains` the arm is free for `duration` [s] (10 by default) from `q0` [rad] and `qdot0` [rad/s], and a
     `setpoint` is refused. With `gains` it moves to `setpoint` [rad] (4 s by default), and holding the effort counts
     as error, unless the `control_period` [s] is given. Raises `ValueError` if
-    the motion cannot be known that well for that long.
+    the motion cannot be known that well for that long. A `method` is planned beside the arm's.
     """
-    return Plan(**_native.plan(locals()))
+    found = _native.plan(locals() | {"tableau": _tableau("method", method)})
+    own = found.pop("own")
+    return Plan(**found, own=own and OwnPlan(*own))

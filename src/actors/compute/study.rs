@@ -16,11 +16,11 @@ use super::workers::WorkerPool;
 use crate::actors::arm::sim::{ArmSettings, HeldLimit};
 use crate::actors::node::{Call, Nodes, Reply, Unserved};
 use crate::protocol::catalog::Service;
-use crate::services::study::{Computed, Integrating, Work};
 pub use crate::services::study::{
-    FindHeldLimit, IntegrationStep, PlanRun, PlannedRun, PredictStability, Predicted, Ran, Refused,
-    RunOffline, SuggestGains, Suggested,
+    AnalyseMethod, FindHeldLimit, IntegrationStep, PlanRun, PlannedRun, PredictStability,
+    Predicted, Ran, Refused, RunOffline, SuggestGains, Suggested,
 };
+use crate::services::study::{Computed, Integrating, Work};
 use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
 
@@ -43,6 +43,7 @@ impl<const N: usize> Study<N> {
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<PredictStability<N>>(Service::Stability, address.clone());
         nodes.serve::<FindHeldLimit>(Service::HeldLimit, address.clone());
+        nodes.serve::<AnalyseMethod<N>>(Service::Method, address.clone());
         nodes.serve::<RunOffline<N>>(Service::Rollout, address.clone());
         nodes.serve::<SuggestGains<N>>(Service::SuggestGains, address.clone());
         nodes.serve::<PlanRun<N>>(Service::Plan, address.clone());

@@ -30,6 +30,17 @@ pub(super) const SENSORS: &[Field] = fields![
     "uint64 delay?",
 ];
 
+/// The members of `tableau` in a request: a method by its name, or by its coefficients, numbers or fractions.
+pub(super) const TABLEAU: &[Field] = fields![
+    "string name?",
+    "float64[][] a?",
+    "float64[] b?",
+    "float64[] c?",
+    "float64[] b_hat?",
+    "float64[][] a_q?",
+    "float64[] b_q?",
+];
+
 /// A viewer's request: frames relative to another frame.
 pub(super) const FRAME_GOAL: &[Field] = fields![
     "string[] source_frames",
@@ -115,6 +126,8 @@ pub(super) const TYPES: &[Type] = types! {
     "pendularm_interfaces/msg/Params": PARAMS,
     "pendularm_interfaces/msg/Limits": LIMITS,
     "pendularm_interfaces/msg/Sensors": SENSORS,
+    "pendularm_interfaces/msg/Tableau": TABLEAU,
+    "pendularm_interfaces/msg/OwnPlan": ["float64 timestep  # s", "uint64 evaluations", "float64 error  # m"],
     "pendularm_interfaces/msg/CriticalMode": [
         "float64 growth_per_step",
         "float64 frequency  # Hz",

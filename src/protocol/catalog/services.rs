@@ -218,6 +218,36 @@ table! {
             ])
             .computation()
             .null_is_absent(),
+        /// Analyses a method by its tableau.
+        Method = service("/study/method", "pendularm_interfaces/srv/Method", Node::Study)
+            .request(fields![
+                "pendularm_interfaces/msg/Tableau tableau",
+                "pendularm_interfaces/msg/Gains gains?",
+                "pendularm_interfaces/msg/Params params?",
+                "float64[] setpoint?  # rad",
+                "float64 control_period?  # s",
+            ])
+            .response(fields![
+                "uint64 stages",
+                "uint64 evaluations",
+                "uint64 order",
+                "string failing_condition",
+                "uint64 embedded_order",
+                "string[] faults",
+                "float64 measured_order  # 1",
+                "float64 real_limit  # 1",
+                "float64 imaginary_limit  # 1",
+                "bool symplectic",
+                "float64[] region_extent  # 1",
+                "string[] region",
+                "float64 timestep_limit_held  # s",
+                "float64 timestep_limit  # s",
+                "uint64 swing_evaluations",
+                "string[] methods",
+                "uint64[] swing_evaluations_of_methods",
+            ])
+            .computation()
+            .null_is_absent(),
         /// Runs the arm offline.
         Rollout = service("/study/rollout", "pendularm_interfaces/srv/Rollout", Node::Study)
             .request(fields![
@@ -238,6 +268,7 @@ table! {
                 "float64[] viscous?  # N m s/rad",
                 "pendularm_interfaces/msg/Limits limits?  # SI",
                 "pendularm_interfaces/msg/Sensors sensors?  # SI",
+                "pendularm_interfaces/msg/Tableau tableau?",
             ])
             .response(fields![
                 "float64[] times  # s",
@@ -297,6 +328,7 @@ table! {
                 "float64[] viscous?  # N m s/rad",
                 "pendularm_interfaces/msg/Limits limits?  # SI",
                 "pendularm_interfaces/msg/Sensors sensors?  # SI",
+                "pendularm_interfaces/msg/Tableau tableau?",
             ])
             .response(fields![
                 "string integrator",
@@ -309,6 +341,7 @@ table! {
                 "float64[] timesteps  # s",
                 "uint64[] evaluations",
                 "float64[] errors  # m",
+                "pendularm_interfaces/msg/OwnPlan own",
             ])
             .computation()
             .null_is_absent(),

@@ -16,7 +16,8 @@ use crate::services::arm::{SetGains, SetParams};
 use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::gains::{GainsError, GainsRequirements, SuggestedGains, search_gains};
-use crate::study::planner::{PlanError, Planned, Task, plan};
+use crate::study::method::Given;
+use crate::study::planner::{PlanError, Planned, Task, plan_beside};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -76,6 +77,8 @@ request! {
         control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
         /// Friction, limits, sensors and delay.
         robot: RobotSettings<N> = RobotSettings::read(&mut fields),
+        /// A method of one's own, which is planned beside the arm's.
+        tableau: Option<Given> = super::method::read(&mut fields),
     }
 }
 
@@ -140,6 +143,9 @@ impl<const N: usize> Answered for PlanRun<N> {
                 timesteps: all().map(|one| one.timestep).collect::<Vec<_>>(),
                 evaluations: all().map(|one| one.evaluations).collect::<Vec<_>>(),
                 errors: all().map(|one| one.error).collect::<Vec<_>>(),
+                own: run.planned.own.map(|own| {
+                    object! { timestep: own.timestep, evaluations: own.evaluations, error: own.error }
+                }),
             }
         }))
     }
@@ -200,7 +206,8 @@ impl<const N: usize> Computed<N> for PlanRun<N> {
     fn work(self, present: Present<N>) -> Self::Work {
         StudyWork::new::<N>(async move {
             let task = task(&self, &present)?;
-            let planned = plan(task).await.map_err(Refused::Study)?;
+            let own = self.tableau.map(|given| given.pair().clone());
+            let planned = plan_beside(task, own).await.map_err(Refused::Study)?;
             let period = task.control.period.period;
             let timestep = planned.best.timestep;
             let period = if period > 0.0 { period } else { timestep };

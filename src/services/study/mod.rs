@@ -7,6 +7,7 @@
 mod advice;
 mod held_limit;
 mod integration;
+mod method;
 mod rollout;
 mod stability;
 
@@ -15,6 +16,7 @@ use std::time::Duration;
 pub use self::advice::{PlanRun, PlannedRun, SuggestGains, Suggested};
 pub use self::held_limit::FindHeldLimit;
 pub use self::integration::{Integrating, IntegrationStep, NotIntegrated};
+pub use self::method::{AnalyseMethod, Analysed};
 pub use self::rollout::{Ran, RolloutWork, RunAnswer, RunOffline};
 pub use self::stability::{PredictStability, Predicted};
 use super::arm::{SensorsInForce, SetLimits, SetParams, SetSensors};

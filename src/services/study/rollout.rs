@@ -23,9 +23,10 @@ use crate::services::FieldByField as _;
 use crate::services::arm::{SetGains, SetParams};
 use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::control_loop::{ControlLoop, no_control};
+use crate::study::method::Given;
 use crate::study::paused::Paused;
 use crate::study::rollout::{
-    MAX_SAMPLES, Rollout, RolloutError, RolloutRequest, most_bytes, rollout,
+    MAX_SAMPLES, Rollout, RolloutError, RolloutRequest, most_bytes, rollout_by,
 };
 
 // ---- question -------------------------------------------------------------------------------------------------------
@@ -59,6 +60,8 @@ request! {
         samples: Option<u64> = fields.count("samples", 2..=MAX_SAMPLES),
         /// Whether to run a reference too.
         reference: Option<bool> = fields.boolean("reference"),
+        /// A method of one's own in place of the named one.
+        tableau: Option<Given> = super::method::read(&mut fields),
     }
 }
 
@@ -142,7 +145,8 @@ impl<const N: usize> RolloutWork<N> {
                 if is_alone {
                     (request.samples, request.reference) = (2, false);
                 }
-                rollout(request).await.map_err(Refused::Study)
+                let own = ask.tableau.map(|given| given.pair().clone());
+                rollout_by(request, own).await.map_err(Refused::Study)
             })
         };
         Self {

@@ -11,7 +11,7 @@ use crate::math::shown::Shown;
 use crate::study::critical::shape;
 use crate::study::matrix::{Complex, Matrix};
 use crate::study::paused::pause;
-use crate::study::stability::{NEUTRAL, bisect_in_pieces, first_unstable};
+use crate::study::stability::{NEUTRAL, bisect_in_pieces, first_unstable_until};
 
 /// The critical mode is examined at this multiple of the limit.
 const JUST_BEYOND: f64 = 1.01;
@@ -77,7 +77,8 @@ pub struct HeldLimit {
 pub async fn held_limit(held: HeldLoop, period: Option<f64>) -> HeldLimit {
     let modes = held.modes();
     pause().await;
-    let period_limit = first_unstable(&modes, |period| held.growth(period)).await;
+    let growth = |period| held.growth(period);
+    let period_limit = first_unstable_until(&modes, modes.long(held.steps), growth).await;
     let beyond = period_limit.map(|limit| {
         if limit > 0.0 {
             JUST_BEYOND * limit

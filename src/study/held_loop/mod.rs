@@ -3,7 +3,7 @@
 //! Near a pose the robot is `M v̇ = u - D v - K x`. Once in a period `T` the law samples positions and velocities and
 //! holds `u = -Kp x - Kd v + Ki s`, with `s ↦ s - T x` before it is used. The effort acts at once, or some whole periods
 //! late. No mode grows as long as the eigenvalues of the matrix of a period stay within the unit circle. The search is
-//! that of the arm's own limits, [`super::stability`].
+//! that of the arm's own limits, [`super::stability`], up to 30 time constants of the slowest mode.
 //!
 //! | between two runs of the law | one step of `h` |
 //! | --- | --- |

@@ -18,6 +18,55 @@ pub struct Given {
     pub(super) embedded: Option<Pair>,
 }
 
+/// A method as it is typed.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Typed {
+    /// The rows of `a`.
+    pub a: Vec<Vec<f64>>,
+    /// The weights.
+    pub b: Vec<f64>,
+    /// The times of the stages.
+    pub c: Option<Vec<f64>>,
+    /// The weights of an embedded method.
+    pub b_hat: Option<Vec<f64>>,
+    /// `a` and `b` of positions, if they differ from those of velocities.
+    pub positions: Option<(Vec<Vec<f64>>, Vec<f64>)>,
+}
+
+/// Why a method is not accepted.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{field} is wrong: {why}")]
+pub struct MethodError {
+    /// `a`, `b`, `c`, `b_hat`, `a_q` or `b_q`.
+    pub field: &'static str,
+    /// The fault.
+    pub why: TableauError,
+}
+
+impl TryFrom<&Typed> for Given {
+    type Error = MethodError;
+
+    fn try_from(typed: &Typed) -> Result<Self, MethodError> {
+        let at = |field| move |why| MethodError { field, why };
+        let v = Tableau::new(&typed.a, &typed.b).map_err(at("a"))?;
+        let pair = match &typed.positions {
+            Some((a, b)) => {
+                let q = Tableau::new(a, b).map_err(at("a_q"))?;
+                Pair::new(q, v).map_err(at("b_q"))?
+            }
+            None => Pair::same(v),
+        };
+        let mut given = Self::new(pair);
+        if let Some(c) = &typed.c {
+            given = given.with_times(c).map_err(at("c"))?;
+        }
+        match &typed.b_hat {
+            Some(b_hat) => given.with_embedded(b_hat).map_err(at("b_hat")),
+            None => Ok(given),
+        }
+    }
+}
+
 impl Given {
     /// A method by its tableaus only.
     pub const fn new(pair: Pair) -> Self {
@@ -28,14 +77,28 @@ impl Given {
         }
     }
 
+    /// The tableaus of positions and of velocities.
+    pub const fn pair(&self) -> &Pair {
+        &self.pair
+    }
+
     /// The same with the times of the stages, to which the rows of `a` are compared.
     ///
     /// # Errors
     /// There is not one finite time for each stage.
     pub fn with_times(self, c: &[f64]) -> Result<Self, TableauError> {
-        Tableau::new(self.pair.v().a(), c)?;
+        self.beside("c", c)?;
         let c = Some(c.to_vec());
         Ok(Self { c, ..self })
+    }
+
+    /// A tableau with the `a` of the velocities and these entries.
+    fn beside(&self, name: &'static str, entries: &[f64]) -> Result<Tableau, TableauError> {
+        let (stages, got) = (self.pair.stages(), entries.len());
+        if got != stages {
+            return Err(TableauError::Entries { name, stages, got });
+        }
+        Tableau::new(self.pair.v().a(), entries)
     }
 
     /// The same with the weights of an embedded method, which has the `a` of the velocities.
@@ -43,7 +106,7 @@ impl Given {
     /// # Errors
     /// There is not one finite weight for each stage.
     pub fn with_embedded(self, b_hat: &[f64]) -> Result<Self, TableauError> {
-        let embedded = Pair::same(Tableau::new(self.pair.v().a(), b_hat)?);
+        let embedded = Pair::same(self.beside("b_hat", b_hat)?);
         Ok(Self {
             embedded: Some(embedded),
             ..self

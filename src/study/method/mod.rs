@@ -17,8 +17,8 @@ mod named;
 mod swing;
 mod trees;
 
-pub use self::given::Given;
 use self::given::faults;
+pub use self::given::{Given, MethodError, Typed};
 pub use self::named::{NAMES, named};
 pub use self::swing::{ALLOWED_ERROR, MOST_STEPS, SWING, Swing, measure};
 pub use self::trees::MAX_ORDER;
@@ -26,10 +26,12 @@ use super::control_loop::ControlLoop;
 use super::equilibrium::{equilibrium, gravity_gradient};
 use super::held_loop::{Between, Given as Robot, HeldLoop, held_limit};
 use super::matrix::Matrix;
+use super::paused::pause;
 use super::stability::{Modes, first_unstable, growth};
 use super::tableau::{Pair, Tableau};
 use crate::math::arm::Arm;
 use crate::math::dynamics::mass_matrix;
+use crate::math::integrator::Method;
 
 /// Largest error of a term of a polynomial or a product, within the digits of a typed coefficient.
 const TOLERANCE: f64 = 1e-10;
@@ -61,6 +63,8 @@ pub struct Analysis {
     /// The region of stability.
     pub region: Region,
     /// The largest timestep of the arm's loop if the law runs once in a step \[s\].
+    pub timestep_limit_held: Option<f64>,
+    /// The same at the control period of the loop: a whole part of it. Zero: none was found.
     pub timestep_limit: Option<f64>,
     /// The method on a free swing of the arm.
     pub swing: Swing,
@@ -82,11 +86,7 @@ pub async fn analyse<const N: usize>(given: Given, control: ControlLoop<N>) -> A
     let real_limit = real_limit(pair.v()).await;
     let imaginary_limit = imaginary_limit(pair).await;
     let reach = [real_limit, imaginary_limit].map(|it| it.unwrap_or(30.0));
-    let loop_of_arm = HeldLoop::try_from(&robot(&control, pair)).ok();
-    let limit = match loop_of_arm {
-        Some(held) => held_limit(held, None).await.period_limit,
-        None => None,
-    };
+    let (held, at_period) = loop_limits(&control, pair).await;
     Analysis {
         stages: pair.stages(),
         evaluations: pair.evaluations(),
@@ -97,10 +97,20 @@ pub async fn analyse<const N: usize>(given: Given, control: ControlLoop<N>) -> A
         real_limit,
         imaginary_limit,
         is_symplectic: is_symplectic(pair),
-        region: region(pair, reach),
-        timestep_limit: limit,
+        region: region(pair, reach).await,
+        timestep_limit_held: held,
+        timestep_limit: at_period,
         swing: measure(pair, &control.arm).await,
     }
+}
+
+/// The same swing with each of the live arm's methods, in the order of [`Method::ALL`].
+pub async fn swings<const N: usize>(arm: &Arm<N>) -> [Swing; 4] {
+    let mut found = [Swing::default(); 4];
+    for (swing, method) in found.iter_mut().zip(Method::ALL) {
+        *swing = measure(&Pair::of(method), arm).await;
+    }
+    found
 }
 
 fn is_symplectic(pair: &Pair) -> bool {
@@ -198,7 +208,7 @@ pub fn amplification(pair: &Pair, re: f64, im: f64) -> f64 {
         .spectral_radius()
 }
 
-fn region(pair: &Pair, [real, imaginary]: [f64; 2]) -> Region {
+async fn region(pair: &Pair, [real, imaginary]: [f64; 2]) -> Region {
     let (columns, rows) = PICTURE;
     let (left, top) = (
         1.2 * real.max(1.0),
@@ -215,13 +225,32 @@ fn region(pair: &Pair, [real, imaginary]: [f64; 2]) -> Region {
             .map(|it| if is_stable(it) { '#' } else { '.' })
             .collect()
     };
+    let mut lines = Vec::new();
+    for row in 0..rows {
+        lines.push(line(row));
+        pause().await;
+    }
     Region {
         extent: [-left, right, top],
-        rows: (0..rows).map(line).collect(),
+        rows: lines,
     }
 }
 
 // ---- the arm's loop -------------------------------------------------------------------------------------------------
+
+/// The largest timesteps of the arm's loop \[s\]: if the law runs in every step, and at the control period of the loop.
+pub(super) async fn loop_limits<const N: usize>(
+    control: &ControlLoop<N>,
+    pair: &Pair,
+) -> (Option<f64>, Option<f64>) {
+    let Ok(held) = HeldLoop::try_from(&robot(control, pair)) else {
+        return (None, None);
+    };
+    let period = Some(control.given_period()).filter(|it| *it > 0.0);
+    let found = held_limit(held, period).await;
+    let at = found.at.map(|at| at.timestep_limit);
+    (found.period_limit, at.unwrap_or(found.period_limit))
+}
 
 /// The arm at the equilibrium of its loop, with the method as its motion between two runs of the law.
 fn robot<const N: usize>(control: &ControlLoop<N>, pair: &Pair) -> Robot {

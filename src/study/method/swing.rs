@@ -1,10 +1,10 @@
 //! A method on a free swing of the arm, against its Taylor series.
 
+use super::super::own_run::increment;
 use super::super::paused::PieceWork;
 use super::super::tableau::Pair;
 use super::super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
-use crate::math::dynamics::forward_dynamics;
 
 /// Duration of the swing, from the horizontal at rest with every joint bent by 0.3 rad \[s\].
 pub const SWING: f64 = 1.0;
@@ -31,7 +31,7 @@ const ROUNDING: f64 = 5e-12;
 const HALVINGS: u32 = 4;
 
 /// A measurement.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Swing {
     /// The order by the errors of the three finest runs above rounding, extrapolated to a step of 0; `None` if they are not
     /// finite.
@@ -42,16 +42,12 @@ pub struct Swing {
 
 /// Runs the swing with more and more steps.
 pub async fn measure<const N: usize>(pair: &Pair, arm: &Arm<N>) -> Swing {
-    let none = Swing {
-        order: None,
-        evaluations: None,
-    };
     let start = State::at_rest([BENT; N]);
     let mut reference = TaylorReference::new(start);
     let mut exact = [start; PARTS];
     for state in &mut exact {
         if !reference.follow(arm, &[0.0; N], SWING / PARTS as f64) {
-            return none;
+            return Swing::default();
         }
         *state = *reference.state();
     }
@@ -108,11 +104,7 @@ async fn run<const N: usize>(
     let (mut largest, mut squares) = (0.0, 0.0);
     for exact in exact {
         for _ in 0..steps {
-            let (dq, dv) = pair.increment(h, &state.velocity, |dq, v| {
-                let position = std::array::from_fn(|j| state.position[j] + dq[j]);
-                let velocity = std::array::from_fn(|j| v[j]);
-                forward_dynamics(arm, &position, &velocity, &[0.0; N]).to_vec()
-            });
+            let (dq, dv) = increment(pair, arm, &state, &[0.0; N], h);
             for j in 0..N {
                 state.position[j] += dq[j];
                 state.velocity[j] += dv[j];

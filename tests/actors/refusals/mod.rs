@@ -120,6 +120,7 @@ fn required(service: &str) -> &'static [(&'static str, &'static str)] {
         "/arm_sim/disturb" => &[("effort", "[1,1]"), ("duration", "1")],
         "/ik/solve" | "/ik_action/send_goal" => &[("x", "1"), ("y", "1")],
         "/study/held_limit" => &[("mass_matrix", "[1]")],
+        "/study/method" => &[("tableau", "{\"name\":\"rk4\"}")],
         "/study/plan" => &[("error", "0.001")],
         "/arm_sim/get_parameters"
         | "/arm_sim/get_parameter_types"

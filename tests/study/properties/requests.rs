@@ -6,7 +6,8 @@ use pendularm::protocol::catalog::Service;
 use pendularm::protocol::op::Arguments;
 use pendularm::services::Callable;
 use pendularm::services::study::{
-    Computed, PlanRun, PredictStability, Present, RunOffline, SuggestGains, Work as _,
+    AnalyseMethod, Computed, PlanRun, PredictStability, Present, RunOffline, SuggestGains,
+    Work as _,
 };
 use pendularm::study::control_loop::ControlLoop;
 use serde_json::value::RawValue;
@@ -61,6 +62,12 @@ fn arguments<const N: usize>(dice: &mut Dice, service: Service, usual: &Value) -
     for name in names {
         let is_changed = dice.one_in(3);
         let text = match (name, is_changed) {
+            ("tableau", _) if is_changed || service == Service::Method => format!(
+                r#"{{"a":[[],[{}]],"b":[{},{}]}}"#,
+                special(dice),
+                special(dice),
+                special(dice)
+            ),
             ("integrator", _) => format!(
                 "\"{}\"",
                 ["euler", "midpoint", "verlet", "rk4"][dice.0.usize(0..4)]
@@ -140,12 +147,14 @@ fn any_request_ends<const N: usize>(case: u64, tally: &mut Tally) {
     let service = match dice.0.u32(0..100) {
         0 => Service::SuggestGains,
         1..10 => Service::Stability,
-        10..40 => Service::Rollout,
+        10..20 => Service::Method,
+        20..40 => Service::Rollout,
         _ => Service::Plan,
     };
     let text = arguments::<N>(&mut dice, service, &usual);
     let ended = match service {
         Service::Stability => pieces::<N, PredictStability<N>>(service, &text),
+        Service::Method => pieces::<N, AnalyseMethod<N>>(service, &text),
         Service::Rollout => pieces::<N, RunOffline<N>>(service, &text),
         Service::Plan => pieces::<N, PlanRun<N>>(service, &text),
         _ => pieces::<N, SuggestGains<N>>(service, &text),

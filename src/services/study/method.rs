@@ -1,0 +1,191 @@
+//! `/study/method`: what is known about a method by its tableau, on the arm and its loop.
+//!
+//! A coefficient is a number, or a string with a number or a fraction, such as `"1/3"`.
+//!
+//! **Invariant:** a tableau that is read has at most [`MAX_STAGES`] stages.
+
+use bytes::Bytes;
+use serde_json::value::RawValue;
+
+use super::{Computed, Present, StudyWork, arm_of, with_period};
+use crate::math::arm::ArmError;
+use crate::math::integrator::Method;
+use crate::math::pid::Setpoint;
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Rejections, mistyped};
+use crate::protocol::wire::json;
+use crate::services::FieldByField as _;
+use crate::services::arm::{SetGains, SetParams};
+use crate::services::{Address, Answered, Ask, Callable};
+use crate::study::control_loop::ControlLoop;
+use crate::study::method::{Analysis, Given, MethodError, NAMES, Swing, Typed};
+use crate::study::method::{analyse, named, swings};
+use crate::study::tableau::{MAX_STAGES, Pair, coefficient};
+
+// ---- question -------------------------------------------------------------------------------------------------------
+
+request! {
+    whole
+    /// Analyses a method.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct AnalyseMethod<N> -> Result<Box<Analysed>, ArmError>, |fields| {
+        /// The method. The catalog requires it: without it the request is rejected.
+        method: Option<Given> = read(&mut fields),
+        /// Changed gains.
+        gains: Option<SetGains<N>> = fields.object("gains", SetGains::from_fields),
+        /// Changed parameters of the arm.
+        params: Option<SetParams<N>> = fields.object("params", SetParams::from_fields),
+        /// The setpoint \[rad\], at rest.
+        setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
+        /// The time between two runs of the control law \[s\], not negative; 0 for every step.
+        control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
+    }
+}
+
+/// An analysis, and the live arm's methods on the same swing.
+pub struct Analysed {
+    /// The analysis.
+    pub found: Analysis,
+    /// The swing with each of [`Method::ALL`].
+    pub beside: [Swing; 4],
+}
+
+// ---- reading and writing --------------------------------------------------------------------------------------------
+
+/// The method of the field `tableau`, if there is one and it is valid.
+pub(super) fn read(fields: &mut Fields<'_>) -> Option<Given> {
+    fields.object("tableau", from_fields).flatten()
+}
+
+fn from_fields(fields: &mut Fields<'_>) -> Option<Given> {
+    let name = fields.choice("name", &NAMES, |name| name);
+    let [a, a_q] = ["a", "a_q"].map(|name| rows(fields, name));
+    let [b, b_q] = ["b", "b_q"].map(|name| row(fields, name));
+    let [c, b_hat] = ["c", "b_hat"].map(|name| row(fields, name));
+    if !fields.accepted() {
+        return None;
+    }
+    let is_alone = [&b, &c, &b_hat, &b_q].iter().all(|it| it.is_none()) && a.is_none();
+    let typed = match (name, (a, b), (a_q, b_q)) {
+        (Some(name), _, (None, _)) if is_alone => return named(name),
+        (None, (Some(a), Some(b)), positions) => Typed {
+            a,
+            b,
+            c,
+            b_hat,
+            positions: match positions {
+                (None, None) => None,
+                (a_q, b_q) => Some((a_q.unwrap_or_default(), b_q.unwrap_or_default())),
+            },
+        },
+        _ => {
+            fields.refuse("a", &"must come with b, or name alone");
+            return None;
+        }
+    };
+    match Given::try_from(&typed) {
+        Ok(given) => Some(given),
+        Err(MethodError { field, why }) => {
+            fields.refuse(field, &format_args!("is wrong: {why}"));
+            None
+        }
+    }
+}
+
+/// The coefficients of a field.
+fn row(fields: &mut Fields<'_>, name: &'static str) -> Option<Vec<f64>> {
+    let entries = fields.entries(name, MAX_STAGES)?;
+    coefficients(fields, name, &entries)
+}
+
+/// The rows of a field.
+fn rows(fields: &mut Fields<'_>, name: &'static str) -> Option<Vec<Vec<f64>>> {
+    let entries = fields.entries(name, MAX_STAGES)?.into_iter().enumerate();
+    let rows = entries.map(|(index, raw)| {
+        let name = format!("{name}[{index}]");
+        match json::entries(raw, MAX_STAGES).filter(|it| it.count <= MAX_STAGES) {
+            Some(row) => coefficients(fields, &name, &row.first),
+            None => {
+                let expected = format!("an array of at most {MAX_STAGES} coefficients");
+                fields.refuse(&name, &mistyped(&expected, raw));
+                None
+            }
+        }
+    });
+    // All rows are read, so that each wrong one is named.
+    let rows: Vec<Option<Vec<f64>>> = rows.collect();
+    rows.into_iter().collect()
+}
+
+fn coefficients(fields: &mut Fields<'_>, name: &str, row: &[&RawValue]) -> Option<Vec<f64>> {
+    let read = row.iter().enumerate().map(|(index, raw)| {
+        let value = match json::text(raw) {
+            Some(text) => coefficient(&text),
+            None => json::number(raw).filter(|it| it.is_finite()),
+        };
+        if value.is_none() {
+            let reason = mistyped("a number or a fraction such as \"1/3\"", raw);
+            fields.refuse(&format!("{name}[{index}]"), &reason);
+        }
+        value
+    });
+    let read: Vec<Option<f64>> = read.collect();
+    read.into_iter().collect()
+}
+
+impl<const N: usize> Answered for AnalyseMethod<N> {
+    fn write(answer: Self::Answer, to: &Address) -> Bytes {
+        let answer = answer.map_err(|why| format!("params {why}"));
+        to.outcome(answer.as_ref().map(|analysed| {
+            let Analysed { found, beside } = &**analysed;
+            object! {
+                stages: found.stages,
+                evaluations: found.evaluations,
+                order: found.order,
+                failing_condition: found.failing.as_deref(),
+                embedded_order: found.embedded_order,
+                faults: found.faults.as_slice(),
+                measured_order: found.swing.order,
+                real_limit: found.real_limit,
+                imaginary_limit: found.imaginary_limit,
+                symplectic: found.is_symplectic,
+                region_extent: found.region.extent.as_slice(),
+                region: found.region.rows.as_slice(),
+                timestep_limit_held: found.timestep_limit_held,
+                timestep_limit: found.timestep_limit,
+                swing_evaluations: found.swing.evaluations,
+                methods: Method::ALL.map(Method::name),
+                swing_evaluations_of_methods: beside.map(|it| it.evaluations),
+            }
+        }))
+    }
+}
+
+// ---- work -----------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Computed<N> for AnalyseMethod<N> {
+    type Work = StudyWork<Self::Answer>;
+
+    fn work(self, present: Present<N>) -> Self::Work {
+        StudyWork::new::<N>(async move {
+            let present = present.control;
+            let arm = arm_of(self.params.as_ref(), present.arm)?;
+            let gains = self.gains.as_ref();
+            let control = ControlLoop {
+                arm,
+                gains: gains.map_or(present.gains, |gains| gains.applied_to(&present.gains)),
+                setpoint: self.setpoint.map_or(present.setpoint, Setpoint::at),
+                period: with_period(present.period, self.control_period),
+                ..present
+            };
+            let given = self
+                .method
+                .unwrap_or_else(|| Given::new(Pair::of(control.method)));
+            Ok(Box::new(Analysed {
+                beside: swings(&arm).await,
+                found: analyse(given, control).await,
+            }))
+        })
+    }
+}
