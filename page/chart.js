@@ -4,7 +4,6 @@
 
 import { significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
-import { Pencil } from "./pencil.js";
 import { Axis, LogScale, powerOfTen, times } from "./scale.js";
 import { colors } from "./theme.js";
 
@@ -73,6 +72,9 @@ export function write(context, text, x, y, align, color = colors.muted, font = T
 
 /** Space for large labels and titles on both axes. */
 export const ROOMY = { left: 78, right: 16, top: 16, bottom: 40, font: TEXT };
+
+/** Below this distance a point is not seen [px]. */
+const NEAR = 1;
 
 export class Chart {
   /** @param {Surface} surface @param {Scale} across @param {Scale} up */
@@ -155,19 +157,20 @@ export class Chart {
   }
 
   /**
-   * A line through many points from left to right, with a gap where there is no number.
+   * A line through many points, with a gap where there is no number. A point within `NEAR` of the last drawn one is left out.
    * @param {number} count @param {(i: number) => number} across @param {(i: number) => number | null} up @param {string} color @param {Style} style
    */
   line(count, across, up, color, style = {}) {
     this.begin(color, style);
-    const pencil = new Pencil(this.context);
+    let [lastX, lastY] = [NaN, NaN];
     for (let i = 0; i < count; i += 1) {
       const value = up(i);
-      const y = Number.isFinite(value) ? this.y(/** @type {number} */ (value)) : NaN;
-      if (Number.isFinite(y)) pencil.to(this.x(across(i)), y); // an error of 0 has no place on a logarithmic scale
-      else pencil.lift();
+      const [x, y] = [this.x(across(i)), Number.isFinite(value) ? this.y(/** @type {number} */ (value)) : NaN];
+      if (Math.abs(x - lastX) < NEAR && Math.abs(y - lastY) < NEAR && i < count - 1) continue;
+      if (Number.isNaN(lastY)) this.context.moveTo(x, y);
+      else if (Number.isFinite(y)) this.context.lineTo(x, y);
+      [lastX, lastY] = [x, Number.isFinite(y) ? y : NaN]; // an error of 0 has no place on a logarithmic scale
     }
-    pencil.lift();
     this.end();
   }
 

@@ -72,6 +72,22 @@ class Tasks(CourseTest):
         self.assertFalse(self.page.run("document.querySelector('#course-dial .mark').hidden"))
         self.assertIn("You guessed about 50 ms", self.page.text("#course-question"))
 
+    def test_guess_figure_and_answer_are_kept_on_one_sheet(self):
+        self.step("slow")
+        self.answer("at 3 to 5 ms")
+        self.page.fill(DIAL, "5.5")
+        self.done("the arm shakes")
+        self.answer("It falls")
+        self.page.run("location.reload()")
+        self.page.until("document.querySelector('#connection')?.className === 'pill open' && document.querySelector('#course-steps .done') !== null")
+        self.page.click("#answers-open")
+        row = "[...document.querySelectorAll('#answers-table tbody tr')][1]"
+        self.assertEqual(self.page.run(f"[...{row}.cells].map((one) => one.textContent)"), ["2. Slow the controller down", "5.5 of 4.3 ms control period",
+            "at 3 to 5 ms ✓", "Just below the limit, what does the arm do?", "It falls ✗"])
+        self.assertIn("period=0.0055", self.page.run(f"{row}.querySelector('a').hash"))
+        self.assertEqual(audit(self.page), [])
+        forget_the_inspectors(self.page)
+
     def test_bars_flip_and_grow_beyond_the_limit_and_shrink_below(self):
         self.step("look")
         self.wait(lambda: all(self.image("#course-chart").count(self.color(one)) > 500 for one in ("bad", "accent")), "bars that point down and up")
