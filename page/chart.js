@@ -113,11 +113,15 @@ export class Chart {
     }
     const below = bottom + (this.height - bottom > 24 ? 13 : 9);
     context.font = font;
+    let end = -Infinity; // of the last label; the next one must not touch it
     for (const [value, label] of this.across.marks) {
       const x = Math.round(this.x(value)) + 0.5;
       if (grid === true) line(context, x, top, x, bottom, value === 0 ? colors.line : colors.grid);
       const half = context.measureText(label).width / 2;
-      write(context, label, Math.min(this.width - half, Math.max(half, x)), below, "center", colors.muted, font);
+      const middle = Math.min(this.width - half, Math.max(half, x));
+      if (middle - half < end + 4) continue;
+      write(context, label, middle, below, "center", colors.muted, font);
+      end = middle + half;
     }
     if (across) write(context, across, (left + right) / 2, this.height - 8, "center", colors.muted, font);
     if (!up) return;
@@ -262,8 +266,8 @@ export function drawBars(surface, bars, name = "measurement of the controller") 
  */
 export function drawErrors(surface, errors) {
   if (!errors) return;
-  const chart = new Chart(surface, ERRORS, NONE, ROOMY);
-  chart.frame({ across: "largest error of a joint on the move [rad]" });
+  const chart = new Chart(surface, ERRORS, NONE, { ...ROOMY, left: 12 });
+  chart.frame({ across: "largest error of a joint [rad]" });
   const rows = /** @type {const} */ ([["the method", errors.error, colors.accent], ["the hold", errors.sampling, colors.bad]]);
   const room = (chart.bottom - chart.top) / rows.length;
   rows.forEach(([name, value, color], k) => {

@@ -101,6 +101,7 @@ function cellOf(found, method, timestep) {
 
 const ROOM = { left: 62, right: 14, top: 30, bottom: 36, font: TEXT };
 const CROSS = 4;
+const NARROW = 360; // px
 
 /** @param {import("./surface.js").Surface} surface @param {Rung[]} found */
 export function drawLadder(surface, found) {
@@ -125,6 +126,7 @@ export function drawLadder(surface, found) {
       line(context, x - CROSS, y + CROSS, x + CROSS, y - CROSS, color, 1.75);
     }
     // The methods in their colours, side by side, so that names do not overlap.
-    chart.words(shortName(method), chart.left + (i * (chart.right - chart.left)) / METHODS.length, 10, "left", color, STRONG);
+    const from = width < NARROW ? 8 : chart.left;
+    chart.words(shortName(method), from + (i * (chart.right - from)) / METHODS.length, 10, "left", color, STRONG);
   });
 }
