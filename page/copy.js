@@ -61,7 +61,7 @@ const PROGRAM = ["# The library has no delay, effort limits, friction and sensor
   "import json", "import socket", "import subprocess", "import sys", "from types import SimpleNamespace", "", "import numpy as np"].join("\n");
 
 /** @param {number} links @param {string} service */
-const server = (links, service) => `command = [sys.executable, "-m", "pendularm", "--bind", "127.0.0.1:0", "--links", "${links}"]
+const server = (links, service) => `command = [sys.executable, "-m", "pendularm", "--bind", "127.0.0.1:0", "--links", "${links}", "--log", "off"]
 server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 host, port = server.stdout.readline().split()[-1].rsplit(":", 1)
 stream = socket.create_connection((host, int(port))).makefile("rw")

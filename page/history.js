@@ -149,7 +149,7 @@ export function recorded(name, { now, span }) {
   const run = { duration: rows[rows.length - 1][0] - rows[0][0], samples: rows.length };
   return {
     name, columns: columns.map(([, one]) => one), rows, asked: [rolloutArgs({ ...question, q: start(POSITION), qd: start(VELOCITY) }, run)],
-    python: "zip(runs[0].times, *runs[0].positions.T, *runs[0].velocities.T, *runs[0].efforts.T, runs[0].energy)",
+    python: `zip(${rows[0][0]} + runs[0].times, *runs[0].positions.T, *runs[0].velocities.T, *runs[0].efforts.T, runs[0].energy)`,
     computed: columns.map(([, one]) => one).filter((one) => COMPUTED.test(one)),
     note: "The table is the recorded motion. Python computes a motion from its first row, with the present settings and no sum of the integral yet.",
   };

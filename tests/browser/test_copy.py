@@ -18,12 +18,15 @@ class Copy:
             "document.querySelector('#copy .close').click()")
         return self.page.run("document.querySelector('#copy-area').value")
 
-    def keeps(self, name, caption="#course figcaption"):
-        """Waits until the program of a chart is the one that the wheel's tests run. With `KEEP=1` it is written, with its table."""
+    def store(self, name, caption="#course figcaption", seconds=KEEP_SECONDS):
         if os.environ.get("KEEP"):
-            time.sleep(KEEP_SECONDS)
+            time.sleep(seconds)
             (KEPT / f"{name}.tsv").write_text(self.copied("table", caption) + "\n")
             (KEPT / f"{name}.txt").write_text(self.copied("python", caption))
+
+    def keeps(self, name, caption="#course figcaption"):
+        """Waits until the program of a chart is the one that the wheel's tests run. With `KEEP=1` it is written, with its table."""
+        self.store(name, caption)
         self.wait(lambda: self.copied("python", caption) == (KEPT / f"{name}.txt").read_text(), name)
 
 
@@ -31,6 +34,8 @@ class OfTheCourse(Copy, CourseTest):
     def test_a_recorded_motion_is_a_table_and_python_begins_at_its_first_row(self):
         self.step("energy")
         self.page.until("own('store.js').then(({ state }) => state.time > 0.5)")
+        self.page.click("#pause")
+        self.store("motion", seconds=1)
         head, first, *_ = [row.split("\t") for row in self.copied("table", "#course figcaption").split("\n")]
         self.assertEqual((head[0], head[-1], len(first)), ("time [s]", "energy [J]", 14))
         self.assertIn(f'"q0": [{first[1]}, {first[2]}]', self.copied("python", "#course figcaption"))
