@@ -72,9 +72,9 @@ node_modules: package-lock.json
 	npm ci --silent --no-audit --no-fund
 	@touch node_modules
 
-test-browser: ## Test the page in a headless Chromium, with screenshots; ARGS="-k trial" selects tests, FORM=file tests the page in one file
-	@echo "make test-browser: the page in headless Chromium"
-	@CARGO="$(CARGO)" FORM="$(FORM)" bash scripts/test-browser.sh $(ARGS)
+test-browser: ## Test the page in a headless Chromium, with screenshots; ARGS="-k trial" selects tests, FORM=file tests the page in one file, BROWSER=firefox or webkit there
+	@echo "make test-browser: the page in $(or $(BROWSER),headless Chromium)"
+	@CARGO="$(CARGO)" FORM="$(FORM)" BROWSER="$(BROWSER)" bash scripts/test-browser.sh $(ARGS)
 
 test-clients: build ## Test unmodified clients of other projects: roslibpy, compas_fab, ros-mcp, ros3d, roslib 1 and 2, Lichtblick's packages, roslibrust
 	@echo "make test-clients: needs python3, node 20 with npm, Chromium, and a network the first time"

@@ -1,5 +1,4 @@
-// Actions on all settings at once: apply them, undo the last change, return to the defaults, set a scene; and the matching
-// reset.
+// Actions on all settings at once: apply them, undo the last change, return to the defaults, set a scene; and the matching reset.
 // Invariant: every change can be undone, and refusals are shown.
 
 import { announce, byId, passFocus, warn } from "./dom.js";

@@ -4,7 +4,6 @@
 
 import { significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
-import { Pencil } from "./pencil.js";
 import { Axis, LogScale, powerOfTen, times } from "./scale.js";
 import { colors } from "./theme.js";
 
@@ -74,6 +73,9 @@ export function write(context, text, x, y, align, color = colors.muted, font = T
 /** Space for large labels and titles on both axes. */
 export const ROOMY = { left: 78, right: 16, top: 16, bottom: 40, font: TEXT };
 
+/** Below this distance a point is not seen [px]. */
+const NEAR = 1;
+
 export class Chart {
   /** @param {Surface} surface @param {Scale} across @param {Scale} up */
   constructor({ context, width, height }, across, up, { left = 46, right = 8, top = 6, bottom = 16, font = SMALL } = {}) {
@@ -111,11 +113,15 @@ export class Chart {
     }
     const below = bottom + (this.height - bottom > 24 ? 13 : 9);
     context.font = font;
+    let end = -Infinity; // of the last label; the next one must not touch it
     for (const [value, label] of this.across.marks) {
       const x = Math.round(this.x(value)) + 0.5;
       if (grid === true) line(context, x, top, x, bottom, value === 0 ? colors.line : colors.grid);
       const half = context.measureText(label).width / 2;
-      write(context, label, Math.min(this.width - half, Math.max(half, x)), below, "center", colors.muted, font);
+      const middle = Math.min(this.width - half, Math.max(half, x));
+      if (middle - half < end + 4) continue;
+      write(context, label, middle, below, "center", colors.muted, font);
+      end = middle + half;
     }
     if (across) write(context, across, (left + right) / 2, this.height - 8, "center", colors.muted, font);
     if (!up) return;
@@ -155,19 +161,20 @@ export class Chart {
   }
 
   /**
-   * A line through many points from left to right, with a gap where there is no number.
+   * A line through many points, with a gap where there is no number. A point within `NEAR` of the last drawn one is left out.
    * @param {number} count @param {(i: number) => number} across @param {(i: number) => number | null} up @param {string} color @param {Style} style
    */
   line(count, across, up, color, style = {}) {
     this.begin(color, style);
-    const pencil = new Pencil(this.context);
+    let [lastX, lastY] = [NaN, NaN];
     for (let i = 0; i < count; i += 1) {
       const value = up(i);
-      const y = Number.isFinite(value) ? this.y(/** @type {number} */ (value)) : NaN;
-      if (Number.isFinite(y)) pencil.to(this.x(across(i)), y); // an error of 0 has no place on a logarithmic scale
-      else pencil.lift();
+      const [x, y] = [this.x(across(i)), Number.isFinite(value) ? this.y(/** @type {number} */ (value)) : NaN];
+      if (Math.abs(x - lastX) < NEAR && Math.abs(y - lastY) < NEAR && i < count - 1) continue;
+      if (Number.isNaN(lastY)) this.context.moveTo(x, y);
+      else if (Number.isFinite(y)) this.context.lineTo(x, y);
+      [lastX, lastY] = [x, Number.isFinite(y) ? y : NaN]; // an error of 0 has no place on a logarithmic scale
     }
-    pencil.lift();
     this.end();
   }
 
@@ -259,8 +266,8 @@ export function drawBars(surface, bars, name = "measurement of the controller") 
  */
 export function drawErrors(surface, errors) {
   if (!errors) return;
-  const chart = new Chart(surface, ERRORS, NONE, ROOMY);
-  chart.frame({ across: "largest error of a joint on the move [rad]" });
+  const chart = new Chart(surface, ERRORS, NONE, { ...ROOMY, left: 12 });
+  chart.frame({ across: "largest error of a joint [rad]" });
   const rows = /** @type {const} */ ([["the method", errors.error, colors.accent], ["the hold", errors.sampling, colors.bad]]);
   const room = (chart.bottom - chart.top) / rows.length;
   rows.forEach(([name, value, color], k) => {

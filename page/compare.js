@@ -1,15 +1,15 @@
-// All methods at one timestep against a reference. The runtime computes the same arm from the same state offline. The runs are
-// drawn together and played back together, with error, energy and a joint's angle over time. The panel Error has other
-// timesteps.
+// All methods at one timestep against a reference. The runtime computes the same arm from the same state offline. The runs are drawn together and played back
+// together, with error, energy and a joint's angle over time. The panel Error has other timesteps.
 // Invariant: the compared runs are the runtime's answers, and the live arm does not change. All are shown at the same time. A
 // run that ends early is drawn up to its end, with its last pose as a ghost.
 
 import { Chart, circle, links as drawLinks } from "./chart.js";
+import { copyable } from "./copy.js";
 import { announce, byId, fillTable, setText } from "./dom.js";
 import { busy, option, panel, withoutFigure } from "./field.js";
 import { duration, fixed, METHODS, significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
-import { fromRest, questionOf, withFixedPeriod } from "./question.js";
+import { fromRest, questionOf, rolloutArgs, withFixedPeriod } from "./question.js";
 import { describeRun, distances, endOf } from "./ladder.js";
 import { rollout } from "./runtime.js";
 import { Axis, LogScale, powerOfTen, times } from "./scale.js";
@@ -42,6 +42,7 @@ let surfaces = /** @type {Surface[]} */ ([]);
  * number[], poses: (number[] | null)[], trail: (number[] | null)[], last: number}[]}
  */
 let runs = [];
+let wanted = /** @type {import("./copy.js").Asked[]} */ ([]); // their requests
 let instants = /** @type {number[]} */ ([]); // of the reference's samples [s]
 let lengths = /** @type {number[]} */ ([]);
 let at = 0; // the shown time
@@ -51,6 +52,7 @@ let began = 0; // the clock at the first sample [ms]
 export function startCompare() {
   said = panel(byId("compare-form"), [timestep, seconds, from, controller],
     [["Compare", () => busy(said.buttons[0], "Computing…", compare), { type: "submit", class: "primary" }]]);
+  for (const picture of ["chart", "energy", "angle"]) copyable(byId(`compare-${picture}`).previousElementSibling, content);
   const pictures = /** @type {[string, (surface: Surface) => void][]} */ ([
     ["arm", drawArms],
     ["chart", (surface) => drawLines(surface, () => instants, ({ away }) => away ?? [], errorScale())],
@@ -86,12 +88,14 @@ async function compare() {
   // All runs have one controller, which acts at the same times, also in the reference.
   const common = withFixedPeriod({ ...(from.input.value === "rest" ? fromRest(present) : present), timestep: step });
   const run = { duration: lasts, samples: intervals + 1 };
-  const wanted = [...METHODS.map(([method]) => ({ integrator: method, timestep: step })), { integrator: "rk4", timestep: step * REFERENCE_PART }];
-  const answers = await Promise.all(wanted.map((one) => rollout({ ...common, ...one }, run)));
+  const questions = [...METHODS.map(([method]) => ({ integrator: method, timestep: step })), { integrator: "rk4", timestep: step * REFERENCE_PART }]
+    .map((one) => ({ ...common, ...one }));
+  const answers = await Promise.all(questions.map((one) => rollout(one, run)));
   const refused = answers.find((answer) => !answer.result);
   said.show(withoutFigure(refused?.status ?? ""));
   if (refused) return;
-  const found = answers.map(({ values }, i) => ({ ...values, method: wanted[i].integrator, timestep: wanted[i].timestep }));
+  const found = answers.map(({ values }, i) => ({ ...values, method: questions[i].integrator, timestep: questions[i].timestep }));
+  wanted = questions.map((one) => rolloutArgs(one, run));
   const reference = found.pop();
   const away = found.map((run) => distances(run, reference));
   lengths = present.params.lengths;
@@ -102,6 +106,20 @@ async function compare() {
   at = 0;
   play();
   showTable(found, away, reference, lasts);
+}
+
+/** The runs, to be copied: the errors, energies and angles over time. */
+function content() {
+  const columns = /** @type {[string, (run: any) => (number | null)[], string][]} */ ([
+    ["error [rad]", ({ away }) => away ?? instants.map(() => 0), "max(abs(run.positions[k] - runs[-1].positions[k]))"],
+    ["energy [J]", ({ energy }) => energy, "run.energy[k]"],
+    [`joint ${state.joint + 1} [rad]`, ({ poses }) => poses.map((q) => q && q[state.joint]), `run.positions[k, ${state.joint}]`]]);
+  return {
+    name: "Comparison", columns: ["time [s]", ...columns.flatMap(([name]) => [...METHODS.map(([, run]) => run), "reference"].map((run) => `${run}, ${name}`))],
+    asked: wanted,
+    rows: instants.map((time, k) => [time, ...columns.flatMap(([, valuesOf]) => runs.map((run) => valuesOf(run)[k]))]),
+    python: `((t, ${columns.map(([, , one]) => `*(${one} if k < len(run.times) else None for run in runs)`).join(", ")}) for k, t in enumerate(runs[4].times))`,
+  };
 }
 
 /** A run with its poses, null where they are not finite, and the trail of its end effector [m]. */

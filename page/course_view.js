@@ -3,29 +3,31 @@
 // file the arm belongs to the page, so the step begins at once.
 
 import { beginAnew, remember, setScene } from "./actions.js";
+import { keepAnswer, startAnswers } from "./answers.js";
 import { Chart, drawBars, drawErrors, drawMap, drawPicture, drawResponses, ROOMY } from "./chart.js";
+import { copyable } from "./copy.js";
 import { followEnergy, KEPT, ofLimit, nothingSeen, shrinks, SOFT, stepIn, STEPS, stepsIn, WEAK } from "./course.js";
 import { announce, byId, el, goToAddress, keepChoice, passFocus, remembered, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
 import { duration, fixed, inPageNames, METHODS, multipleOf, partOf, seconds, shortName, significant } from "./format.js";
-import { ENERGY, newest, record, VELOCITY } from "./history.js";
-import { moveOf, rungs } from "./ladder.js";
+import { ENERGY, newest, record, recorded, VELOCITY } from "./history.js";
+import { moveOf } from "./ladder.js";
 import { drawLadder, keyOf, presentMove } from "./ladder_panel.js";
 import { isAlone, linksIn } from "./kernel.js";
 import { latestOnly } from "./latest.js";
 import { drawMotions, FAILING, motionOf, motionsOf } from "./motions.js";
 import { controlPeriodLimit, verdict } from "./policy.js";
-import { fromRest, questionOf, stepsPerUpdate } from "./question.js";
+import { fromRest, questionOf, rolloutArgs, stabilityArgs, stepsPerUpdate } from "./question.js";
 import { connectionText } from "./readouts.js";
 import { pause, rollout, setGains, setIntegrator, setMotors, setParams, setPeriod, setState, step as stepArm } from "./runtime.js";
-import { judge, keep as keepResponse, LASTS, nameOf, present, shown } from "./responses.js";
+import { judge, keep as keepResponse, LASTS, nameOf, present, responsesContent, shown } from "./responses.js";
 import { LogScale } from "./scale.js";
 import { SCENES, settingsOf } from "./scenes.js";
-import { DEFAULTS, fromFragment, hasSettings } from "./settings.js";
+import { DEFAULTS, fromFragment, hasSettings, presentSettings, toFragment } from "./settings.js";
 import { showForm } from "./sheet.js";
 import { state, watch, watchAll } from "./store.js";
 import { StripChart } from "./strip_chart.js";
-import { climb, climbRows, deviation } from "./study.js";
+import { climbRows, deviation, limitsContent, Series } from "./study.js";
 import { Surface } from "./surface.js";
 
 const FIRST = 0.5; // s: in this time of a response its settings are read
@@ -34,6 +36,7 @@ const LOOK_MS = 500;
 const STEPS_SHOWN = 40; // measurements shown in slow motion
 const ROWS = 13; // of the map's border
 const SPAN = 5; // s of the strip chart
+const MEASURED = 1; // s of a measured move
 const ALL_JOINTS = [true, true, true];
 const MASSES = [0.5, 1, 2]; // of the last link [kg]
 const DIVERGED = "The arm diverged. Change a setting, or press “Restart the arm”.";
@@ -46,16 +49,17 @@ const FACTORS = new LogScale(0.25, 4, [0.25, 0.5, 1, 2, 4].map((one) => [one, `$
  * @typedef {object} ChartOfStep
  * @property {() => string} caption
  * @property {() => void} [draw] on the surface; nothing where the step has no chart
+ * @property {() => import("./copy.js").Content | null} [content] to be copied
  * @property {(loop: import("./question.js").Question) => Promise<void>} [ask] for what it shows, about a loop from rest
  */
 /** @type {Record<string, ChartOfStep>} */
 const CHARTS = {
-  velocity: { caption: () => "Speed of the joints [rad/s]", draw: strip([{ column: VELOCITY }]) },
-  energy: { caption: () => "Energy lost or gained since the start [J]", draw: strip([{ column: ENERGY, color: "ink" }], { level: 0 }) },
-  bars: { caption: () => "A tiny push, at each measurement", draw: () => drawBars(surface, now.bars), ask: askBars },
+  velocity: { caption: () => "Speed of the joints [rad/s]", ...strip("Speed of the joints", [{ column: VELOCITY }]) },
+  energy: { caption: () => "Energy lost or gained since the start [J]", ...strip("Energy", [{ column: ENERGY, color: "ink" }], { level: 0 }) },
+  bars: { caption: () => "A tiny push, at each measurement", draw: () => drawBars(surface, now.bars), ask: askBars, content: () => now.content },
   errors: {
     caption: () => `Two errors of one move: ${shortName(state.integrator?.method)}, control period ${duration(period())}`,
-    draw: () => drawErrors(surface, now.errors), ask: askErrors,
+    draw: () => drawErrors(surface, now.errors), ask: askErrors, content: () => now.content,
   },
   responses: {
     caption: () => "Joint 1 comes up to its setpoint",
@@ -63,9 +67,13 @@ const CHARTS = {
       stripTime = newest();
       drawResponses(surface, now.responses, present(), state.setpoint[0], LASTS);
     },
+    content: () => responsesContent(now.responses),
   },
-  map: { caption: () => "Which period is stable", draw: paintMap, ask: askMap },
-  ladder: { caption: () => "Error over run time", draw: () => drawLadder(surface, now.runs) },
+  map: {
+    caption: () => "Which period is stable", draw: paintMap, ask: askMap,
+    content: () => limitsContent("Which period is stable", now.border, (factor) => stabilityArgs(borderQuestion(now.loop, factor))),
+  },
+  ladder: { caption: () => "Error over run time", draw: () => drawLadder(surface, now.series.runs), content: () => now.series.content() },
   pictures: { caption: () => now.scene || "Twelve scenes", draw: paintMotions },
   form: { caption: () => "My arm" },
 };
@@ -86,11 +94,11 @@ function anew() {
     seen: nothingSeen(),
     bars: /** @type {number[]} */ ([]),
     errors: /** @type {{error: number | null, sampling: number | null} | null} */ (null),
+    content: /** @type {import("./copy.js").Content | null} */ (null), // of bars and errors
     firstError: NaN,
     responses: /** @type {import("./responses.js").Response[]} */ ([]),
     response: "", // the settings of the present one; empty if they changed on the way, and once it is kept
-    runs: /** @type {import("./ladder.js").Rung[]} */ ([]),
-    runsKey: "", // the settings of `runs`
+    series: new Series(),
     asked: "", // the settings of the chart
     loop: /** @type {any} */ (null), // the question of the chart
     border: /** @type {import("./chart.js").Row[]} */ ([]),
@@ -123,6 +131,7 @@ export function ticksInLink() {
 
 export function startCourse() {
   surface = new Surface(byId("course-chart"), () => CHARTS[STEPS[at].chart].draw?.());
+  copyable(byId("course-caption").parentElement, () => CHARTS[STEPS[at].chart].content?.() ?? null);
   byId("course-back").addEventListener("click", () => go(at - 1));
   byId("course-next").addEventListener("click", () => go(at + 1));
   byId("course-start").addEventListener("click", begin);
@@ -132,6 +141,7 @@ export function startCourse() {
   }, String(i + 1))));
   tick(...stepsIn(remembered(TICKS)), ...stepsIn(new URLSearchParams(location.hash.slice(1)).get("done")));
   at = Math.max(0, stepIn(location.hash));
+  startAnswers();
   watch("links", open);
   let before = "";
   watch("connection", (connection) => {
@@ -511,7 +521,9 @@ function lookAtResponse(seen) {
   if (now.response === "" || state.time < LASTS) return;
   now.response = "";
   const points = present();
-  now.responses = keepResponse(now.responses, { gains: state.gains, motors: state.motors, name, points, ...judge(points, state.setpoint[0]) });
+  const question = fromRest(/** @type {any} */ (questionOf(state)), STEPS[at].offset?.slice(0, state.links));
+  const one = { gains: state.gains, motors: state.motors, name, question, points, ...judge(points, state.setpoint[0]) };
+  now.responses = keepResponse(now.responses, one);
   const found = shown(now.responses);
   for (const key of Object.keys(seen.responses)) seen.responses[key] ||= found[key];
   const words = Object.keys(seen.responses).filter((key) => seen.responses[key]);
@@ -519,7 +531,7 @@ function lookAtResponse(seen) {
 }
 
 function showTask() {
-  const { task, guess, question } = STEPS[at];
+  const { id, task, guess, question } = STEPS[at];
   const { began, ticked, guessed, answered } = now;
   byId("course-task").hidden = !began || (guess !== undefined && guessed < 0);
   byId("course-task").classList.toggle("done", ticked);
@@ -533,6 +545,7 @@ function showTask() {
   place.replaceChildren();
   if (guess && began && guessed < 0) ask(place, guess, -1, (k) => {
     now.guessed = k;
+    keepAnswer(id, { guess: k });
     show();
     byId("course-dial").querySelector("input")?.focus({ preventScroll: true });
   });
@@ -541,6 +554,7 @@ function showTask() {
       `${guessed === guess.right ? "Your guess was right." : `You guessed ${guess.answers[guessed]}.`} ${guess.because}`));
     ask(place, question, answered, (k) => {
       now.answered = k;
+      keepAnswer(id, { answer: k });
       showTask();
       place.querySelector("[aria-pressed=true]")?.focus({ preventScroll: true });
       announce(k === question.right ? `Right. ${question.because}` : "Not that one. Try again.");
@@ -587,6 +601,8 @@ function look() {
     announce("Done.");
     if (dial) dial.show();
     showBig();
+    const figure = `${byId("course-figure").textContent} ${byId("course-what").textContent}`;
+    if (!byId("course-big").hidden) keepAnswer(one.id, { figure, settings: toFragment(/** @type {any} */ (presentSettings(state)), state.links) });
   }
   showTask();
 }
@@ -605,8 +621,8 @@ function showChosen() {
 
 /** Requests the chart's data again, when its settings have changed. */
 function refresh({ chart }) {
-  if (now.runs.length > 0 && now.runsKey !== keyOf(presentMove())) {
-    now.runs = [];
+  if (now.series.move && keyOf(now.series.move) !== keyOf(presentMove())) {
+    now.series.forget();
     surface.redraw();
   }
   // The charts are about the controller, which holds the stretched arm.
@@ -635,20 +651,23 @@ const inquire = latestOnly(async ({ ask, mine, key, loop }) => {
 
 async function askBars(loop) {
   const mine = now;
-  // Without gravity, so only the push is visible. It is a push of the velocity, which excites the fastest motion of the
-  // loop.
-  const bars = await deviation({ ...loop, params: { ...loop.params, gravity: 0 } }, loop.q, period());
-  mine.bars = bars ?? [];
+  // Without gravity, so only the push is visible. It is a push of the velocity, which excites the fastest motion of the loop.
+  const found = await deviation({ ...loop, params: { ...loop.params, gravity: 0 } }, loop.q, period());
+  mine.bars = found?.bars ?? [];
+  mine.content = found?.content ?? null;
   mine.seen.shrinks = shrinks(mine.bars);
 }
 
 async function askErrors(loop) {
   const mine = now;
-  const { result, values } = await rollout(moveOf(loop), { duration: 2, samples: 101, reference: true });
-  if (!result) {
-    mine.errors = null;
-    return;
-  }
+  const run = { duration: 2, samples: 101, reference: true };
+  const { result, values } = await rollout(moveOf(loop), run);
+  mine.errors = mine.content = null;
+  if (!result) return;
+  mine.content = {
+    name: "Two errors of one move", columns: ["error of the method [rad]", "error of the hold [rad]"], rows: [[values.error, values.sampling_error]],
+    asked: [rolloutArgs(moveOf(loop), run)], python: "[(run.error, run.sampling_error) for run in runs]",
+  };
   mine.errors = { error: values.error, sampling: values.sampling_error };
   if (Number.isNaN(mine.firstError) && values.error > 0) mine.firstError = values.error;
   mine.seen.gain = mine.firstError / (values.error ?? NaN);
@@ -657,15 +676,17 @@ async function askErrors(loop) {
 /** The border of the map. The damping moves the dot, not the border. */
 async function askMap(loop) {
   const mine = now;
-  const question = { ...loop, integrator: "rk4", control_period: 0 };
   const key = borderKey(loop);
   if (key === mine.borderAsked) return;
   Object.assign(mine, { borderAsked: key, border: [] });
-  const ask = (factor) => ({ ...question, gains: { ...question.gains, kd: damped(factor) } });
-  await climbRows(FACTORS, ROWS, ask, () => mine === now && key === borderKey(mine.loop), (factor, values) => {
+  await climbRows(FACTORS, ROWS, (factor) => borderQuestion(loop, factor), () => mine === now && key === borderKey(mine.loop), (factor, values) => {
     mine.border.push({ factor, limit: values.control_period_limit ?? Infinity });
     surface.redraw();
   });
+}
+
+function borderQuestion(loop, factor) {
+  return { ...loop, integrator: "rk4", control_period: 0, gains: { ...loop.gains, kd: damped(factor) } };
 }
 
 /** What the border depends on: all of the loop but the damping and the clocks. */
@@ -677,21 +698,23 @@ async function measure() {
   const mine = now;
   const move = presentMove();
   if (!move) return;
-  const key = keyOf(move);
-  Object.assign(now, { runs: [], runsKey: key });
-  const isWanted = () => mine === now && key === keyOf(presentMove());
-  const refused = await climb(move, 1, isWanted, (rung) => { mine.runs.push(rung); surface.redraw(); });
+  const refused = await mine.series.measure(move, MEASURED, () => mine === now, () => surface.redraw());
+  if (refused === null) return;
   setText(byId("course-status"), inPageNames(refused));
-  mine.seen.measured = mine.runs.length === rungs(move.control_period).length;
+  mine.seen.measured = refused === "";
   look();
 }
 
-/** A function that draws the last seconds. @param {import("./strip_chart.js").Series[]} series @param {{level?: number}} [more] */
-function strip(series, more) {
+/** Draws the last seconds, or copies them. @param {string} name @param {import("./strip_chart.js").Series[]} series @param {{level?: number}} [more] */
+function strip(name, series, more) {
   const chart = new StripChart(series, 0.2, 300);
-  return () => {
-    stripTime = newest();
-    chart.draw(surface, { now: stripTime || 0, span: SPAN, links: state.links, shown: ALL_JOINTS, across: "simulation time [s]", ...more });
+  const view = () => ({ now: newest() || 0, span: SPAN, links: state.links, shown: ALL_JOINTS, across: "simulation time [s]", ...more });
+  return {
+    draw() {
+      stripTime = newest();
+      chart.draw(surface, view());
+    },
+    content: () => recorded(name, view()),
   };
 }
 

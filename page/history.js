@@ -1,8 +1,9 @@
 // The last five minutes of the arm, one row per joint state: the source of the plots, the trail and the CSV file.
-// Invariant: rows are in order of simulation time, without repetitions. A reset clears them. The memory is
-// allocated once.
+// Invariant: rows are in order of simulation time, without repetitions. A reset clears them. The memory is allocated once.
 
+import { exact } from "./format.js";
 import { energies, gravityLoad } from "./mechanics.js";
+import { questionOf, rolloutArgs } from "./question.js";
 import { toFragment } from "./settings.js";
 import { MOST_LINKS, state } from "./store.js";
 
@@ -105,36 +106,53 @@ export function firstAfter(time) {
 
 /** @typedef {import("./settings.js").Settings} Settings */
 
-const COLUMNS = /** @type {[string, string, number][]} */ ([
+/** Quantities of each joint: name, unit, first column. @type {[string, string, number][]} */
+const QUANTITIES = [
   ["position", "rad", POSITION],
   ["setpoint", "rad", SETPOINT],
   ["velocity", "rad/s", VELOCITY],
   ["effort", "N m", EFFORT],
   ["gravity_load", "N m", LOAD],
-]);
+];
+
+/** The columns of an arm with `links` links, each with its name and unit, in the order of the file. @param {number} links @returns {[number, string][]} */
+function columnsOf(links) {
+  /** @type {[number, string][]} */
+  const joints = QUANTITIES.flatMap(([name, unit, first]) => Array.from({ length: links }, (_, i) => [first + i, `${name}${i + 1} [${unit}]`]));
+  return [[TIME, "time [s]"], ...joints, [KINETIC, "kinetic [J]"], [POTENTIAL, "potential [J]"], [ENERGY, "energy [J]"]];
+}
 
 /** The file's text, for an arm with `links` links. @param {number} links @param {Settings | null} settings the present ones */
 export function csvText(links, settings) {
-  const names = ["time [s]"];
-  const offsets = [TIME];
-  for (const [name, unit, offset] of COLUMNS) {
-    for (let joint = 0; joint < links; joint += 1) {
-      names.push(`${name}${joint + 1} [${unit}]`);
-      offsets.push(offset + joint);
-    }
-  }
-  names.push("kinetic [J]", "potential [J]", "energy [J]");
-  offsets.push(KINETIC, POTENTIAL, ENERGY);
+  const columns = columnsOf(links);
   const about = settings ? toFragment(settings, links).split("&").map((one) => `# ${one}`) : [];
-  const lines = ["# pendularm; settings as they were when this was saved", ...about, names.join(",")];
-  for (let i = 0; i < record.length; i += 1) {
-    const row = record.at(i);
-    lines.push(offsets.map((offset) => {
-      const value = record.data[row + offset];
-      return Number.isFinite(value) ? value : "";
-    }).join(","));
-  }
-  return `${lines.join("\r\n")}\r\n`;
+  const rows = rowsOf(columns.map(([column]) => column), 0, record.length).map((row) => row.map(exact).join(","));
+  return ["# pendularm; settings as they were when this was saved", ...about, columns.map(([, name]) => name).join(","), ...rows, ""].join("\r\n");
+}
+
+/** These columns of the rows from `first` to before `last`. @param {number[]} columns */
+function rowsOf(columns, first, last) {
+  return Array.from({ length: Math.max(0, last - first) }, (_, i) => columns.map((column) => record.data[record.at(first + i) + column]));
+}
+
+/** What a run of the study has, too. */
+const COMPUTED = /^(time|position|velocity|effort|energy)/;
+
+/** The recorded rows up to a time, to be copied; null without a motion. @param {string} name @param {{now: number, span: number}} time [s] */
+export function recorded(name, { now, span }) {
+  const [first, last] = [firstAfter(now - span), Math.min(record.length, firstAfter(now) + 1)];
+  const question = questionOf(state);
+  if (last - first < 2 || !question) return null;
+  const columns = columnsOf(state.links);
+  const rows = rowsOf(columns.map(([column]) => column), first, last);
+  const start = (/** @type {number} */ column) => question.q.map((_, joint) => record.data[record.at(first) + column + joint]);
+  const run = { duration: rows[rows.length - 1][0] - rows[0][0], samples: rows.length };
+  return {
+    name, columns: columns.map(([, one]) => one), rows, asked: [rolloutArgs({ ...question, q: start(POSITION), qd: start(VELOCITY) }, run)],
+    python: `zip(${rows[0][0]} + runs[0].times, *runs[0].positions.T, *runs[0].velocities.T, *runs[0].efforts.T, runs[0].energy)`,
+    computed: columns.map(([, one]) => one).filter((one) => COMPUTED.test(one)),
+    note: "The table is the recorded motion. Python computes a motion from its first row, with the present settings and no sum of the integral yet.",
+  };
 }
 
 /** The time of the newest row [s]; NaN if there is none. */

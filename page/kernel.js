@@ -1,5 +1,4 @@
-// The arm in this page: its kernel runs in a worker, behind the interface of a WebSocket. If workers are forbidden, it runs in
-// the page's own thread.
+// The arm in this page: its kernel runs in a worker, behind the interface of a WebSocket. If workers are forbidden, it runs in the page's own thread.
 // Invariant: for its callers it behaves like a WebSocket to the runtime.
 
 /** The kernel, as gzip in base64, in the page in one file. A server's page has none. */

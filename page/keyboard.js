@@ -65,7 +65,7 @@ export function startKeyboard() {
     el("td", {}, "in the view: move the choice beside “drag”; with shift, the setpoint")));
   byId("help-keys").append(...rows);
   byId("help-button").addEventListener("click", toggleHelp);
-  byId("help-close").addEventListener("click", toggleHelp);
+  for (const button of document.querySelectorAll("dialog .close")) button.addEventListener("click", () => button.closest("dialog")?.close());
   const box = byId("shortcuts-on");
   box.checked = remembered(SWITCH) !== "off";
   box.addEventListener("change", () => keepChoice(SWITCH, box.checked ? "on" : "off"));
@@ -81,7 +81,7 @@ function pressed(event) {
   const own = key === " " && target.matches("button, input, summary, select");
   if (typing || own) return;
   if (!byId("shortcuts-on").checked && key !== "?") return;
-  if (byId("help").open && key !== "?") return;
+  if (document.querySelector("dialog[open]") && key !== "?") return;
   const act = actions.get(key.length === 1 ? key.toLowerCase() : key);
   if (!act) return;
   event.preventDefault();

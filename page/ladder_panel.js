@@ -2,6 +2,7 @@
 // Invariant: every point is a run of the runtime, and the result is removed as soon as its settings change.
 
 import { Chart, DASHED, line, STRONG, TEXT, write } from "./chart.js";
+import { copyable } from "./copy.js";
 import { announce, byId, fillTable, setText } from "./dom.js";
 import { busy, option, panel } from "./field.js";
 import { duration, methodName, METHODS, shortName, significant } from "./format.js";
@@ -9,7 +10,7 @@ import { cheapest, errorText, moveOf, stamp, timestepsFor, uncertaintyOf } from 
 import { loopKey, questionOf } from "./question.js";
 import { LogScale, powerOfTen } from "./scale.js";
 import { state, watch } from "./store.js";
-import { climb } from "./study.js";
+import { Series } from "./study.js";
 import { Surface } from "./surface.js";
 import { colors } from "./theme.js";
 
@@ -22,17 +23,15 @@ const INVITATION = "Runs this arm on one fixed move, with every method at eight 
 let surface;
 let said;
 const seconds = option({ label: "duration", unit: "s", value: SECONDS });
-/** @type {Rung[]} */
-let found = [];
-let asked = ""; // the settings of `found`
-let running = 0; // the number of started measurements; only the newest continues
+const series = new Series();
 
 export function startLadder() {
-  surface = new Surface(byId("ladder"), (one) => drawLadder(one, found));
+  copyable(byId("ladder").previousElementSibling, () => series.content());
+  surface = new Surface(byId("ladder"), (one) => drawLadder(one, series.runs));
   said = panel(byId("ladder-form"), [seconds], [["Measure", () => busy(said.buttons[0], "Measuring…", measure), { type: "submit", class: "primary" }]]);
   setText(byId("ladder-text"), INVITATION);
   // The measurement belongs to another loop.
-  watch(["links", "params", "gains", "period", "enabled"], () => { if (asked && asked !== keyOf(presentMove())) forget(INVITATION); });
+  watch(["links", "params", "gains", "period", "enabled"], () => { if (series.move && keyOf(series.move) !== keyOf(presentMove())) forget(INVITATION); });
 }
 
 /** The measured move of the active loop; null until its settings are known. */
@@ -48,9 +47,7 @@ export function keyOf(/** @type {import("./question.js").Question | null} */ mov
 
 /** Shows no figure, and ignores pending ones. @param {string} text the text in its place */
 function forget(text) {
-  running += 1;
-  found = [];
-  asked = "";
+  series.forget();
   setText(byId("ladder-text"), text);
   byId("ladder-table").replaceChildren();
   surface.redraw();
@@ -64,28 +61,25 @@ async function measure() {
   }
   said.show("");
   forget("");
-  const mine = running;
-  asked = keyOf(move);
   const length = seconds.number() ?? SECONDS;
-  const about = stamp(move, length);
-  const refused = await climb(move, length, () => mine === running, (rung) => { found.push(rung); surface.redraw(); });
-  if (mine !== running) return;
+  const refused = await series.measure(move, length, () => true, () => surface.redraw());
+  if (refused === null) return;
   said.show(refused);
-  describe(about, timestepsFor(move.control_period));
+  describe(series.runs, stamp(move, length), timestepsFor(move.control_period));
 }
 
-/** @param {string} about the move @param {number[]} timesteps [s] */
-function describe(about, timesteps) {
-  const text = found.length > 0 ? `${inWords(cheapest(found, WANTED))} ${about}` : INVITATION;
+/** @param {Rung[]} found @param {string} about the move @param {number[]} timesteps [s] */
+function describe(found, about, timesteps) {
+  const text = found.length > 0 ? `${inWords(found, cheapest(found, WANTED))} ${about}` : INVITATION;
   setText(byId("ladder-text"), text);
   if (found.length === 0) return;
   announce(text);
   fillTable(byId("ladder-table"), ["timestep", ...METHODS.map(([method], i) => [shortName(method), `method${i + 1}`])],
-    timesteps.map((timestep) => [duration(timestep), ...METHODS.map(([method]) => cellOf(method, timestep))]));
+    timesteps.map((timestep) => [duration(timestep), ...METHODS.map(([method]) => cellOf(found, method, timestep))]));
 }
 
-/** @param {Rung[]} best the cheapest sufficient run of each method */
-function inWords(best) {
+/** @param {Rung[]} found @param {Rung[]} best the cheapest sufficient run of each method */
+function inWords(found, best) {
   const controlled = found.some(({ sampling }) => sampling !== null);
   const meaning = controlled
     ? " Solid lines: error of the method. Dashed lines: distance from a controller without a hold. The table shows both [rad]: method + hold."
@@ -100,13 +94,14 @@ function inWords(best) {
     + (uncertainty === null ? "" : ` The reference itself is known to ${significant(uncertainty, 1)} rad.`);
 }
 
-function cellOf(method, timestep) {
+function cellOf(found, method, timestep) {
   const one = found.find((rung) => rung.method === method && rung.timestep === timestep);
   return one ? errorText(one).replace(" + ", "\u00a0+\u00a0") : "–"; // only other texts may break
 }
 
 const ROOM = { left: 62, right: 14, top: 30, bottom: 36, font: TEXT };
 const CROSS = 4;
+const NARROW = 360; // px
 
 /** @param {import("./surface.js").Surface} surface @param {Rung[]} found */
 export function drawLadder(surface, found) {
@@ -131,6 +126,7 @@ export function drawLadder(surface, found) {
       line(context, x - CROSS, y + CROSS, x + CROSS, y - CROSS, color, 1.75);
     }
     // The methods in their colours, side by side, so that names do not overlap.
-    chart.words(shortName(method), chart.left + (i * (chart.right - chart.left)) / METHODS.length, 10, "left", color, STRONG);
+    const from = width < NARROW ? 8 : chart.left;
+    chart.words(shortName(method), from + (i * (chart.right - from)) / METHODS.length, 10, "left", color, STRONG);
   });
 }

@@ -6,6 +6,7 @@ import { startAim } from "./aim.js";
 import { hasMoved, redrawTrail, startArmView } from "./arm_view.js";
 import { startCompare } from "./compare.js";
 import { startControls } from "./controls.js";
+import { startCopy } from "./copy.js";
 import { moveCourse, startCourse } from "./course_view.js";
 import { byId, setAddress } from "./dom.js";
 import { wake } from "./surface.js";
@@ -29,8 +30,7 @@ const BEAT_MS = 100;
 const FIGURES = 2;
 const SENTENCE_MS = 1000;
 
-// The token is in a cookie now, which scripts cannot read. So it is removed from the address, and is not in the history
-// or in copied links.
+// The token is in a cookie now, which scripts cannot read. So it is removed from the address, and is not in the history or in copied links.
 const address = new URL(location.href);
 if (address.searchParams.has("token")) {
   address.searchParams.delete("token");
@@ -50,6 +50,7 @@ startStability();
 startLadder();
 startCompare();
 startActions();
+startCopy();
 startKeyboard();
 startShare();
 startAim(byId("arm"));

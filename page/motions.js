@@ -2,7 +2,7 @@
 // Invariant: both are runs of the runtime, from the same start. The live arm does not change.
 
 import { links as drawLinks, STRONG, TEXT, write } from "./chart.js";
-import { duration, methodName, significant } from "./format.js";
+import { duration, shortName, significant } from "./format.js";
 import { endOf } from "./ladder.js";
 import { joints, reach } from "./mechanics.js";
 import { noGains } from "./question.js";
@@ -48,7 +48,7 @@ export function motionOf({ question, run }, values, isCorrect, playedIn) {
   const slower = playedIn / run.duration;
   const pace = slower > 1 ? `${significant(slower, 2)} times slower` : `${significant(1 / slower, 2)} times faster`;
   return {
-    name: `${isCorrect ? "Correct" : "Failing"}: ${methodName(question.integrator)}, ${duration(question.timestep)}`,
+    name: `${isCorrect ? "Correct" : "Failing"}: ${shortName(question.integrator)}, ${duration(question.timestep)}`,
     note: ended !== null ? `diverged at ${duration(ended)}` : `${duration(run.duration)}, ${pace}`,
     poses: values.positions.map((/** @type {number[]} */ q) => (q?.every(Number.isFinite) ? q : null)),
     lengths: question.params.lengths, color: isCorrect ? "good" : "bad",

@@ -1,9 +1,10 @@
 // The plots' panel: four strip charts and the phase plot, with legends and a common cursor; and the recording as a CSV file.
 // Invariant: a file is passed to the browser and released.
 
+import { copyable } from "./copy.js";
 import { byId, el, setText } from "./dom.js";
 import { short, significant } from "./format.js";
-import { csvText, EFFORT, ENERGY, firstAfter, LOAD, newest, POSITION, record, SETPOINT, VELOCITY } from "./history.js";
+import { csvText, EFFORT, ENERGY, firstAfter, LOAD, newest, POSITION, record, recorded, SETPOINT, VELOCITY } from "./history.js";
 import { energyName } from "./policy.js";
 import { presentSettings } from "./settings.js";
 import { state, watch } from "./store.js";
@@ -30,6 +31,7 @@ let cursor = NaN; // the time under the pointer [s, simulation time]; NaN withou
 let legends = [];
 
 export function startPlots() {
+  copyable(byId("plot-save").parentElement, () => recorded("The plots", view("")));
   plots = CHARTS.map(([id, chart]) => ({ chart, surface: new Surface(byId(`plot-${id}`), (surface) => chart.draw(surface, view(id))) }));
   for (const { chart, surface: { canvas } } of plots.slice(0, 4)) {
     canvas.addEventListener("pointermove", (event) => hover(chart.timeAt(event.offsetX)));

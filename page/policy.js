@@ -137,9 +137,8 @@ export function keepAnswer(state, asked, answer) {
 }
 
 /**
- * The time in which Euler or midpoint double the energy of the fastest small free swing, at a timestep [s]; 0 for other
- * methods and other loops. A step multiplies the swing by 1 + iz or by 1 - z²/2 + iz, with z = timestep times its
- * angular frequency.
+ * The time in which Euler or midpoint double the energy of the fastest small free swing, at a timestep [s]; 0 for other methods and other loops. A step
+ * multiplies the swing by 1 + iz or by 1 - z²/2 + iz, with z = timestep times its angular frequency.
  */
 export function doublingTime(/** @type {string} */ method, /** @type {number} */ timestep, /** @type {any} */ answer) {
   if (answer?.timestep_limit_held !== 0 || !answer.critical || !["euler", "midpoint"].includes(method)) return 0;
@@ -172,10 +171,7 @@ export function controlPeriodLimit(state) {
   return answer && acts(state) ? periodLimitIn(state, answer) : NaN;
 }
 
-/**
- * The same in an answer. An answer without one belongs to a control law that runs at every step without a delay. Then
- * it is the timestep's limit.
- */
+/** The same in an answer. An answer without one belongs to a control law that runs at every step without a delay. Then it is the timestep's limit. */
 function periodLimitIn(/** @type {any} */ { period }, /** @type {any} */ answer) {
   if (answer.control_period_limit !== undefined) return open(answer.control_period_limit);
   return period?.delay ? NaN : open(answer.timestep_limit_held);

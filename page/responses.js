@@ -3,10 +3,14 @@
 
 import { significant } from "./format.js";
 import { POSITION, record, TIME } from "./history.js";
+import { rolloutArgs } from "./question.js";
 
 /** @typedef {import("./question.js").Gains} Gains */
 /** @typedef {{effort: number[] | null, anti_windup: string}} Motors */
-/** @typedef {{gains: Gains, motors: Motors | null, name: string, points: number[][], overshoot: number, error: number}} Response */
+/**
+ * @typedef {{gains: Gains, motors: Motors | null, name: string, question: import("./question.js").Question, points: number[][], overshoot: number,
+ * error: number}} Response
+ */
 
 /** Length of a response [s]. */
 export const LASTS = 5;
@@ -46,6 +50,16 @@ export const WORDS = { clamp: "no cure", none: "no cure", conditional: "conditio
 /** Adds a complete response. One with the same settings replaces the old one. @param {Response[]} responses @param {Response} one */
 export function keep(responses, one) {
   return [...responses.filter(({ name }) => name !== one.name), one].slice(-MOST);
+}
+
+/** Complete responses, to be copied. @param {Response[]} responses @returns {import("./copy.js").Content} */
+export function responsesContent(responses) {
+  return {
+    name: "Joint 1 comes up to its setpoint", columns: ["settings", "time [s]", "joint 1 [rad]"],
+    rows: responses.flatMap(({ name, points }) => points.map(([time, angle]) => [name, time, angle])),
+    asked: responses.map(({ question }) => rolloutArgs(question, { duration: LASTS, samples: 60 * LASTS + 1 })),
+    python: `[(name, t, q[0]) for name, run in zip(${JSON.stringify(responses.map(({ name }) => name))}, runs) for t, q in zip(run.times, run.positions)]`,
+  };
 }
 
 /** What the complete responses show: a sag, too much integral, windup, its cure with the same gains. @param {Response[]} responses */

@@ -1,5 +1,4 @@
-// A rosbridge client over a WebSocket or an object with its interface: calls as promises, and subscriptions that survive a lost
-// connection.
+// A rosbridge client over a WebSocket or an object with its interface: calls as promises, and subscriptions that survive a lost connection.
 // Invariant: a promise of `call` is always fulfilled, with `result: false` and a reason if there is no answer.
 
 const FIRST_RETRY_MS = 300;

@@ -6,16 +6,17 @@
 
 import { beginAnew } from "./actions.js";
 import { Chart, drawBars, drawMap } from "./chart.js";
+import { copyable } from "./copy.js";
 import { shrinks } from "./course.js";
 import { byId, el, setText } from "./dom.js";
 import { duration, methodName, METHODS } from "./format.js";
 import { latestOnly } from "./latest.js";
 import { answerInForce, factorOf, limitInForce, limitText, scaled, whyText } from "./policy.js";
-import { fromRest, isFree, questionOf, stepsPerUpdate } from "./question.js";
+import { fromRest, isFree, questionOf, stabilityArgs, stepsPerUpdate } from "./question.js";
 import { setGains, setIntegrator, setPeriod } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { LOOP, state, watch } from "./store.js";
-import { climbRows, deviation, LOOKS } from "./study.js";
+import { climbRows, deviation, limitsContent, LOOKS } from "./study.js";
 import { Surface } from "./surface.js";
 import { openTab } from "./views.js";
 
@@ -33,6 +34,7 @@ let chart;
 let mapAsked = ""; // the settings of `rows`
 /** Limits with a hold and with control in every stage [s], as far as they are known. @type {import("./chart.js").Row[]} */
 let rows = [];
+let asked; // the question of a row
 /** The base gains of the map's scale. They do not change while the arm's gains are a multiple of them, so the dot moves and the border stays. */
 let anchor = null;
 
@@ -43,6 +45,8 @@ export function startStability() {
   watch(["integrator", "gains", "params", "period", "setpoint", "limits", "enabled", "tab", "links"], () => map.redraw());
   canvas.addEventListener("click", (event) => goTo(event.offsetX, event.offsetY));
   canvas.addEventListener("keydown", byArrows);
+  copyable(canvas.previousElementSibling, () => limitsContent("Where the loop is stable", rows, (factor) => stabilityArgs(asked(factor))));
+  copyable(byId("push-bars").previousElementSibling, () => pushed);
   bars = new Surface(byId("push-bars"), (surface) => drawBars(surface, heights, state.enabled ? "measurement of the controller" : "step"));
   watch([...LOOP, "tab", "view"], lookAtPush);
 }
@@ -74,8 +78,8 @@ async function askBorder() {
   if (key === mapAsked) return;
   mapAsked = key;
   rows = [];
-  const ask = (factor) => ({ ...question, gains: scaled(question.gains, factor) });
-  await climbRows(factors, ROWS, ask, () => mapAsked === key, (factor, values) => {
+  asked = (factor) => ({ ...question, gains: scaled(question.gains, factor) });
+  await climbRows(factors, ROWS, asked, () => mapAsked === key, (factor, values) => {
     rows.push(sampled ? { factor, limit: values.control_period_limit ?? Infinity }
       : { factor, limit: values.timestep_limit_held ?? Infinity, continuous: values.timestep_limit_continuous ?? Infinity });
     map.redraw();
@@ -134,6 +138,7 @@ const ASK_MS = 60;
 
 let bars;
 let heights = /** @type {number[]} */ ([]);
+let pushed = /** @type {import("./copy.js").Content | null} */ (null);
 let pushAsked = "";
 
 function lookAtPush() {
@@ -150,7 +155,8 @@ const push = latestOnly(async ({ loop, key, steps }) => {
   const every = steps * loop.timestep;
   const found = await deviation(loop, loop.q, every);
   if (key !== pushAsked || !found) return;
-  heights = found;
+  pushed = found.content;
+  heights = found.bars;
   const isOff = isFree(loop.gains);
   const outcome = isOff ? "nothing damps the push"
     : `the push ${shrinks(heights) ? "shrinks" : "does not shrink"} over ${LOOKS} ${steps > 1 ? "measurements" : "steps"}`;

@@ -2,7 +2,7 @@
 // Invariant: the live arm does not change, and outdated results are not reported.
 
 import { read, rungs } from "./ladder.js";
-import { fromRest } from "./question.js";
+import { fromRest, rolloutArgs } from "./question.js";
 import { rollout, stability } from "./runtime.js";
 
 /** @typedef {import("./question.js").Question} Question */
@@ -12,25 +12,50 @@ const PUSH_SPEED = 1e-6; // rad/s
 /** Number of samples of the deviation after a push. */
 export const LOOKS = 14;
 
-/**
- * Runs the series on one move of a loop, one run at a time. Returns the refusal, if there is one.
- * @param {Question} move @param {number} length [s] @param {() => boolean} isWanted whether to go on
- * @param {(rung: import("./ladder.js").Rung) => void} tell
- */
-export async function climb(move, length, isWanted, tell) {
-  const run = { duration: length, samples: SAMPLES, reference: true };
-  for (const rung of rungs(move.control_period)) {
-    const question = { ...move, integrator: rung.method, timestep: rung.timestep };
-    const answer = await rollout(question, run);
-    if (!isWanted()) return "";
-    if (!answer.result) return answer.status;
-    // The shorter of two times, which reduces the effect of other work on the machine.
-    const again = await rollout(question, { ...run, reference: false });
-    const wall = Math.min(answer.values.wall_time, again.values.wall_time ?? Infinity);
-    if (!isWanted()) return "";
-    tell(read(rung, { ...answer.values, wall_time: wall }));
+/** Runs of one move with all methods and timesteps. A new measurement ends the old one. */
+export class Series {
+  runs = /** @type {import("./ladder.js").Rung[]} */ ([]);
+  asked = /** @type {import("./copy.js").Asked[]} */ ([]); // the requests of the runs
+  move = /** @type {Question | null} */ (null);
+
+  /**
+   * Runs the series, one run at a time. Returns the refusal, if there is one, and null if it was ended.
+   * @param {Question} move @param {number} length [s] @param {() => boolean} isWanted whether to go on @param {() => void} tell
+   */
+  async measure(move, length, isWanted, tell) {
+    this.forget();
+    const { runs, asked } = Object.assign(this, { move });
+    const run = { duration: length, samples: SAMPLES, reference: true };
+    for (const rung of rungs(move.control_period)) {
+      const question = { ...move, integrator: rung.method, timestep: rung.timestep };
+      const answer = await rollout(question, run);
+      if (this.runs !== runs || !isWanted()) return null;
+      if (!answer.result) return answer.status;
+      // The shorter of two times, which reduces the effect of other work on the machine.
+      const again = await rollout(question, { ...run, reference: false });
+      const wall = Math.min(answer.values.wall_time, again.values.wall_time ?? Infinity);
+      if (this.runs !== runs || !isWanted()) return null;
+      runs.push(read(rung, { ...answer.values, wall_time: wall }));
+      asked.push(rolloutArgs(question, run));
+      tell();
+    }
+    return "";
   }
-  return "";
+
+  forget() {
+    Object.assign(this, { runs: [], asked: [], move: null });
+  }
+
+  /** The runs, to be copied. A run that diverged has no error. @returns {import("./copy.js").Content} */
+  content() {
+    return {
+      name: "Error over run time", columns: ["method", "timestep [s]", "error of the method [rad]", "error of the hold [rad]", "run time [s]"],
+      rows: this.runs.map(({ method, timestep, error, sampling, wall }) => [method, timestep, error, sampling, wall]), asked: this.asked,
+      python: '[(one["integrator"], one["timestep"], *([run.error, run.sampling_error] if run.times[-1] > common["duration"] - 1.000001 * one["timestep"] '
+        + "else [None, None]), run.wall_time) for one, run in zip(asked, runs)]",
+      note: "Run times differ from machine to machine, and from run to run.",
+    };
+  }
 }
 
 /**
@@ -50,9 +75,21 @@ export async function climbRows(scale, count, ask, isWanted, tell) {
 }
 
 /**
- * A tiny push of the last joint at rest: its speed [rad/s] at each of the next samples, `every` [s] apart. It is the
- * difference of two runs, with and without the push, and null if they are refused.
- * @param {Question} loop @param {number[]} rest pose [rad] @param {number} every
+ * The border of a map, to be copied. @param {string} name @param {import("./chart.js").Row[]} rows
+ * @param {(factor: number) => import("./copy.js").Asked} ask the request of a row @returns {import("./copy.js").Content}
+ */
+export function limitsContent(name, rows, ask) {
+  const limit = rows.some((row) => "continuous" in row) ? ["timestep, torque held", "timestep_limit_held"] : ["control period", "control_period_limit"];
+  return {
+    name, columns: ["multiple of the gains", `limit of the ${limit[0]} [s]`], rows: rows.map((row) => [row.factor, row.limit]),
+    asked: rows.map(({ factor }) => ask(factor)),
+    python: `zip([${rows.map(({ factor }) => factor).join(", ")}], [run.${limit[1]} for run in runs])`,
+  };
+}
+
+/**
+ * A tiny push of the last joint at rest: its speed [rad/s] at each of the next samples, `every` [s] apart. It is the difference of two runs, with and without
+ * the push, and null if they are refused. Also what can be copied of it. @param {Question} loop @param {number[]} rest pose [rad] @param {number} every
  */
 export async function deviation(loop, rest, every) {
   const question = fromRest(loop, rest);
@@ -60,5 +97,10 @@ export async function deviation(loop, rest, every) {
   const pushedOne = { ...question, qd: question.qd.with(-1, PUSH_SPEED) };
   const [still, pushed] = await Promise.all([rollout(question, run), rollout(pushedOne, run)]);
   if (!still.result || !pushed.result) return null;
-  return pushed.values.velocities.slice(1).map((row, k) => row.at(-1) - (still.values.velocities[k + 1]?.at(-1) ?? 0));
+  const bars = pushed.values.velocities.slice(1).map((row, k) => row.at(-1) - (still.values.velocities[k + 1]?.at(-1) ?? 0));
+  return { bars, content: {
+    name: "A tiny push, at each measurement", columns: ["measurement", "speed of the last joint [rad/s]"], rows: bars.map((bar, k) => [k + 1, bar]),
+    asked: [rolloutArgs(question, run), rolloutArgs(pushedOne, run)],
+    python: "[(k, b[-1] - a[-1]) for k, (a, b) in enumerate(zip(runs[0].velocities, runs[1].velocities)) if k > 0]",
+  } };
 }

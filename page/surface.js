@@ -1,9 +1,7 @@
-// Scheduling of drawing: a frame is requested only after a change, and painters return whether they need another one. Also
-// canvases with the screen's resolution: sized in device pixels, drawn in CSS pixels, and painted in the next frame after a
-// change.
-// Invariant: without a change no frame is requested, and a paused or hidden page draws nothing. A canvas's size is read when it
-// changes, not at every frame. A canvas is opaque and has one pixel for each covered pixel of the screen, so the browser copies
-// it without blending or resampling.
+// Scheduling of drawing: a frame is requested only after a change, and painters return whether they need another one. Also canvases with the screen's
+// resolution: sized in device pixels, drawn in CSS pixels, and painted in the next frame after a change.
+// Invariant: without a change no frame is requested, and a paused or hidden page draws nothing. A canvas's size is read when it changes, not at every frame.
+// A canvas is opaque and has one pixel for each covered pixel of the screen, so the browser copies it without blending or resampling.
 
 import { colors, onTheme } from "./theme.js";
 

@@ -17,9 +17,11 @@ const SETTINGS = new RegExp("(^#|&)(links|method|timestep|gravity|masses|lengths
 
 export function startViews() {
   byId("view-switch").addEventListener("click", () => show(state.view === "course" ? "workbench" : "course"));
+  const refuse = () => announce("Full screen is not allowed here.");
   byId("full-screen").addEventListener("click", () => {
     if (document.fullscreenElement) document.exitFullscreen();
-    else document.documentElement.requestFullscreen?.().catch(() => announce("Full screen is not allowed here."));
+    else if (document.fullscreenEnabled) document.documentElement.requestFullscreen().catch(refuse);
+    else refuse();
   });
   document.addEventListener("fullscreenchange", () => setText(byId("full-screen"), document.fullscreenElement ? "Leave full screen" : "Full screen"));
   startLinks();

@@ -17,6 +17,8 @@ PAGE = pathlib.Path(__file__).parent.parent / "page"
 MOST_BYTES = 640_000
 IMPORT = re.compile(r'^import \{([^}]*)\} from "\./([^"]+)";\n', re.M)
 EXPORT = re.compile(r"^export ((?:async )?(?:function|class|const) )(\w+)", re.M)
+# Comments that have lines of their own, which the file has no need of.
+COMMENT = re.compile(r"^ *(//[^\n]*|/\*\*((?!\*/).)*\*/)\n", re.M | re.S)
 POLICY = ("default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; "
           "img-src data: blob:; base-uri 'none'; form-action 'none'")
 LOADER = """
@@ -41,7 +43,7 @@ def modules(name, done, above=()):
     if name in done:
         return ""
     done.add(name)
-    text = (PAGE / name).read_text()
+    text = COMMENT.sub("", (PAGE / name).read_text())
     before = "".join(modules(other, done, (*above, name)) for _, other in IMPORT.findall(text))
     imported = lambda found: f'const {{{found[1].replace(" as ", ": ")}}} = pendularm["{found[2]}"];\n'
     body = EXPORT.sub(r"\1\2", IMPORT.sub(imported, text))

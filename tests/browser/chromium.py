@@ -212,7 +212,7 @@ class Page:
         try:
             return self.run(expression)
         except BrowserError as error:
-            if "navigated" in str(error) or "context was destroyed" in str(error):
+            if any(one in str(error) for one in ("navigated", "context was destroyed", "unload", "browsing context")):
                 return None
             raise
 
@@ -271,20 +271,21 @@ class Page:
     def fill(self, selector, text):
         """Types into a field in place of what it holds, and presses Enter."""
         self.run(f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.scrollIntoView({{block: 'center'}}); e.focus(); e.select(); }})()")
-        self.send("Input.insertText", {"text": text})
+        self.insert(text)
         self.key("Enter")
+
+    def insert(self, text):
+        self.send("Input.insertText", {"text": text})
 
     def decode(self, png):
         return Image(*self.run(DECODE % base64.b64encode(png).decode()))
 
-    def screenshot(self, path=None, whole=False, clip=None):
-        """A PNG of the window, the whole page or a `clip` (x, y, width, height)."""
+    def screenshot(self, path=None, whole=False):
+        """A PNG of the window or the whole page."""
         params = {"format": "png", "captureBeyondViewport": whole}
         if whole:
             size = self.send("Page.getLayoutMetrics")["cssContentSize"]
             params["clip"] = {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}
-        if clip:
-            params["clip"] = {**dict(zip(("x", "y", "width", "height"), clip)), "scale": 1}
         png = base64.b64decode(self.send("Page.captureScreenshot", params)["data"])
         if path:
             with open(path, "wb") as file:

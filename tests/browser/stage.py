@@ -4,6 +4,7 @@ Invariant: a test passes only if its page's console said nothing: no exception, 
 """
 
 import atexit
+import base64
 import functools
 import os
 import pathlib
@@ -11,6 +12,7 @@ import re
 import time
 import unittest
 
+import webdriver
 from alone import Alone
 from chromium import Browser
 from runtime import Runtime
@@ -25,9 +27,14 @@ FOREIGN = "elsewhere.example"
 
 NUMBER = "input[type=number]"
 
+# The other browsers have the tests of the file that need neither a telephone's window nor a protocol of Chromium.
+BROWSER = os.environ.get("BROWSER", "chromium")
+
+
 @functools.cache
 def browser():
-    one = Browser(extra=[f"--host-resolver-rules=MAP {FOREIGN} 127.0.0.1"])
+    others = {"firefox": webdriver.Firefox, "webkit": webdriver.WebKit}
+    one = others[BROWSER]() if BROWSER in others else Browser(extra=[f"--host-resolver-rules=MAP {FOREIGN} 127.0.0.1"])
     atexit.register(one.__exit__)
     return one
 
@@ -35,6 +42,11 @@ def browser():
 def needs_server(why):
     """A test that the page in a file has no part in, and the reason."""
     return unittest.skipIf(IS_FILE, why)
+
+
+def needs_chromium(why):
+    """A test that uses what only the protocol of Chromium has."""
+    return unittest.skipIf(BROWSER != "chromium", why)
 
 
 def milliseconds(seconds):
@@ -56,6 +68,8 @@ class PageTest(unittest.TestCase):
 
     def visit(self, url, **view):
         """A page at any address."""
+        if BROWSER != "chromium" and (view.get("dark") or view.get("density", 1) > 1 or view.get("touch") or view.get("width", 1440) < 900):
+            self.skipTest(f"{BROWSER} has a plain window of a desktop only")
         page = browser().page(url, **view)
         self.addCleanup(page.close)
         return page
@@ -82,7 +96,7 @@ class PageTest(unittest.TestCase):
         if not self.course:
             page.run("document.body.dataset.view === 'course' && document.querySelector('#view-switch').click()")
         # The page's own modules, those that run, by name.
-        page.run(f"window.own = {'async (name) => pendularm[name]' if IS_FILE else '(name) => import(`/${name}`)'}; 0")
+        page.run(f"void (window.own = {'async (name) => pendularm[name]' if IS_FILE else '(name) => import(`/${name}`)'})")
 
     def values(self, service, **args):
         return self.runtime.call(service, **args)["values"]
@@ -105,10 +119,8 @@ class PageTest(unittest.TestCase):
         return self.page.screenshot(ARTEFACTS / f"{name}.png", **how)
 
     def image(self, selector):
-        """A picture of the element as it is now."""
-        left, top, width, height = self.page.box(selector)
-        x, y = self.page.run("[scrollX, scrollY]")
-        return self.page.decode(self.page.screenshot(clip=[round(one) for one in (left + x, top + y, width, height)]))
+        """A picture of a canvas as it is now."""
+        return self.page.decode(base64.b64decode(self.page.run(f"document.querySelector('{selector}').toDataURL().split(',')[1]")))
 
     def color(self, name):
         """A colour of the style sheet, in the theme that is on."""

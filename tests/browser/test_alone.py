@@ -1,10 +1,12 @@
-"""The page in one file: a sandbox around it, and no worker. `tests/page/runs.mjs` compares the kernel's bits."""
+"""The page in one file: a sandbox around it, no worker, and the bits of its kernel, which `cargo run --example runs` in wasm/ writes natively."""
 
 import json
+import os
+import pathlib
 import unittest
 
 from alone import FILE
-from stage import IS_FILE, PageTest
+from stage import IS_FILE, PageTest, needs_chromium
 
 # Sends the texts of the page to the page around it.
 REPORT = """<script>setInterval(() => parent.postMessage([document.querySelector("#connection").className,
@@ -24,8 +26,8 @@ class AloneTest(PageTest):
           frame.height = 800; frame.srcdoc = text; document.body.append(frame); })(%s)""" % json.dumps(FILE.read_text() + step + REPORT))
         page.until("window.received && window.received[0] === 'pill open' && window.received[1] > 0.3", why="the arm runs in the frame")
         for button, part, said in (("share", 2, "Copying is not allowed here"), ("full-screen", 3, "Full screen is not allowed here.")):
-            page.run(f"document.querySelector('iframe').contentWindow.postMessage('{button}', '*')")
-            page.until(f"window.received[{part}] === '{said}'")
+            # The step announces itself too, maybe later.
+            page.until(f"document.querySelector('iframe').contentWindow.postMessage('{button}', '*'), window.received[{part}] === '{said}'")
         self.assertEqual(page.complaints, [])
 
     def test_in_a_frame_of_text_a_first_script_gives_it_a_step_and_settings(self):
@@ -39,6 +41,7 @@ class AloneTest(PageTest):
         page.until(f"{inside}.querySelector('#links').value === '3'")
         self.assertEqual(page.complaints, [])
 
+    @needs_chromium("a script before those of the page")
     def test_without_a_worker_the_page_itself_runs_the_arm(self):
         page = self.visit("about:blank")
         page.send("Page.addScriptToEvaluateOnNewDocument", {"source": "window.Worker = class { constructor() { throw new Error('forbidden'); } };"})
@@ -47,6 +50,15 @@ class AloneTest(PageTest):
         self.runtime.page = page
         self.assertTrue(self.runtime.call("/study/gains")["result"])
         self.assertEqual(page.complaints, [])
+
+    def test_the_kernel_has_the_bits_of_the_native_program(self):
+        ours = self.page.run("""pendularm["kernel.js"].unpack(document.querySelector("#kernel-module").textContent)
+            .then((bytes) => WebAssembly.instantiate(bytes, { env: { milliseconds: () => performance.now() } }))
+            .then(({ instance: { exports } }) => { const length = exports.compare(); return new TextDecoder().decode(new Uint8Array(exports.memory.buffer,
+                exports.output(), length)); })""")
+        native = pathlib.Path(os.environ["RUNS"]).read_text()
+        self.assertEqual(len(native.splitlines()), 32)
+        self.assertEqual(ours, native, "16 runs and 16 answers")
 
     def test_the_time_of_a_short_run_is_finer_than_the_clock_of_the_browser(self):
         """The browser's clock goes in steps of 0.1 ms: an answer between its steps is a mean of many runs."""
@@ -61,7 +73,7 @@ class AloneTest(PageTest):
         self.runtime.page = page
         self.assertEqual(len(self.runtime.next("/joint_states")["position"]), 3)
         page.until("document.querySelector('#links').checkVisibility() && document.querySelector('#links').value === '3'")
-        page.run("window.old = 1; document.querySelector('#links').value = '2'; document.querySelector('#links').dispatchEvent(new Event('change'))")
+        page.run("window.old = 1, document.querySelector('#links').value = '2', document.querySelector('#links').dispatchEvent(new Event('change'))")
         page.until(f"window.old === undefined && {SHOWN} && document.querySelector('#links').value === '2'", why="the page anew")
         self.assertEqual(len(self.runtime.next("/joint_states")["position"]), 2)
         self.assertEqual(page.run("location.hash"), "#step=slow&links=2")
@@ -70,7 +82,7 @@ class AloneTest(PageTest):
     def test_the_address_keeps_the_number_of_links_and_another_one_brings_that_arm(self):
         page = self.page
         for address, after in (("#links=3", "#links=3"), ("#step=4&links=2", "#step=4&links=2")):
-            page.run(f"window.old = 1; location.hash = '{address}'")
+            page.run(f"window.old = 1, location.hash = '{address}'")
             page.until(f"window.old === undefined && {SHOWN} && document.querySelector('#links').value === '{after[-1]}'", why="the page anew")
             self.assertEqual(page.run("location.hash"), after)
         page.until("document.querySelector('#course-start').textContent === 'Restart step'", why="a step that starts at once")

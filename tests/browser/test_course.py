@@ -3,7 +3,7 @@
 import math
 import time
 
-from stage import IS_FILE, PageTest
+from stage import IS_FILE, PageTest, needs_chromium
 from test_layout import CLIPPED, PHONE, audit, forget_the_inspectors
 
 STEPS = ("hold", "slow", "pid", "look", "method", "timestep", "limit", "energy", "price", "extreme", "own")
@@ -72,6 +72,22 @@ class Tasks(CourseTest):
         self.assertFalse(self.page.run("document.querySelector('#course-dial .mark').hidden"))
         self.assertIn("You guessed about 50 ms", self.page.text("#course-question"))
 
+    def test_guess_figure_and_answer_are_kept_on_one_sheet(self):
+        self.step("slow")
+        self.answer("at 3 to 5 ms")
+        self.page.fill(DIAL, "5.5")
+        self.done("the arm shakes")
+        self.answer("It falls")
+        self.page.run("location.reload()")
+        self.page.until("document.querySelector('#connection')?.className === 'pill open' && document.querySelector('#course-steps .done') !== null")
+        self.page.click("#answers-open")
+        row = "[...document.querySelectorAll('#answers-table tbody tr')][1]"
+        self.assertEqual(self.page.run(f"[...{row}.cells].map((one) => one.textContent)"), ["2. Slow the controller down", "5.5 of 4.3 ms control period",
+            "at 3 to 5 ms ✓", "Just below the limit, what does the arm do?", "It falls ✗"])
+        self.assertIn("period=0.0055", self.page.run(f"{row}.querySelector('a').hash"))
+        self.assertEqual(audit(self.page), [])
+        forget_the_inspectors(self.page)
+
     def test_bars_flip_and_grow_beyond_the_limit_and_shrink_below(self):
         self.step("look")
         self.wait(lambda: all(self.image("#course-chart").count(self.color(one)) > 500 for one in ("bad", "accent")), "bars that point down and up")
@@ -94,7 +110,8 @@ class Tasks(CourseTest):
     def test_a_finer_timestep_helps_the_method_only(self):
         self.step("timestep")
         self.page.until("document.querySelector('#course-figure').textContent === '4 ms'")
-        time.sleep(0.5)  # the first errors are asked for
+        self.wait(lambda: self.image("#course-chart").count(self.color("bad")) > 500, "the first errors")
+        self.page.until("document.querySelector('.outdated') === null")
         self.page.run("""new MutationObserver(() => { window.faint ||= document.querySelector('.outdated') !== null; })
             .observe(document.querySelector('#course-chart'), { attributes: true })""")
         self.page.fill(DIAL, "0.2")
@@ -194,6 +211,7 @@ class Tasks(CourseTest):
             self.page.run("history.back()")
             self.page.until(f"document.querySelector('#course-title').textContent === '{title}'")
 
+    @needs_chromium("a window of any size")
     def test_no_chart_is_black_after_a_change_of_size(self):
         self.step("method")
         # A copy is read, because a canvas that is read often complains.
@@ -304,6 +322,7 @@ class Tasks(CourseTest):
         self.press("#course-question button")
         self.page.until("document.activeElement.closest('#course-dial') !== null", why="after the guess the dial is next")
 
+    @needs_chromium("prints to a file")
     def test_paper_shows_the_pictures_and_of_a_sheet_the_course_only(self):
         self.page.run("""addEventListener('afterprint', () => { window.paper = [...document.querySelectorAll('#arm, #course-chart')]
             .map((one) => Math.max(...one.getContext('2d').getImageData(1, 1, 1, 1).data.slice(0, 3))); })""")
@@ -318,6 +337,7 @@ class Tasks(CourseTest):
         self.assertFalse(self.page.run("document.querySelector('#arm').checkVisibility()"))
         self.assertTrue(self.page.run("document.querySelector('#view-switch').click(), document.querySelector('#arm').checkVisibility()"))
 
+    @needs_chromium("colours of the system")
     def test_forced_colors_leave_the_pictures_theirs(self):
         self.page.send("Emulation.setEmulatedMedia", {"features": [{"name": "forced-colors", "value": "active"}]})
         self.assertNotEqual(self.color("joint1"), self.color("joint2"))

@@ -1,7 +1,7 @@
 """The page's pictures: the arm where it is, its target, the plots; on dense screens, small ones, in the dark, with three links."""
 
 from chromium import close
-from stage import PageTest
+from stage import PageTest, needs_chromium
 
 SMALL = {"width": 360, "height": 740, "density": 2, "touch": True}
 
@@ -99,6 +99,7 @@ class TwoLinks(View, Sums, PageTest):
         self.page.until("window.saved?.[0] === 'pendularm.csv'")
         self.assertTrue(self.page.run("window.saved[1].startsWith('blob:')"))
 
+    @needs_chromium("the size of the heap")
     def test_an_hour_would_take_no_more_than_ten_megabytes(self):
         def heap():
             self.page.run("gc()")
