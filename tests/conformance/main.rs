@@ -16,6 +16,10 @@
 #[rustfmt::skip]
 mod common;
 mod causes;
+mod paper;
+#[path = "../support/papers.rs"]
+#[rustfmt::skip]
+mod papers;
 mod program;
 
 use std::collections::BTreeSet;
