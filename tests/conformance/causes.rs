@@ -73,7 +73,7 @@ fn nine_in_ten_mistakes_are_recognised_and_none_is_taken_for_another() {
     for links in [2, 3] {
         let arm = uneven(links);
         for (says, equations) in equations::MISTAKES {
-            let force = |_: f64, q: &[f64], v: &[f64]| equations.acceleration(&arm, q, v);
+            let force = |_: f64, q: &[f64], v: &[f64]| equations.acceleration(&arm, q, v, &vec![0.0; links]);
             score.add(says, motion(&arm, "rk4", &swing(links, |s| step("rk4", s, 0.0, 0.01, force))).cause.as_deref());
         }
     }
@@ -110,7 +110,7 @@ fn the_right_equations_are_those_of_the_arm() {
     for links in [2, 3] {
         let (arm, state) = (uneven(links), swing(links, Clone::clone).remove(0));
         let expected = arm.free_acceleration(&state.position, &state.velocity);
-        let got = equations::RIGHT.acceleration(&arm, &state.position, &state.velocity);
+        let got = equations::RIGHT.acceleration(&arm, &state.position, &state.velocity, &vec![0.0; links]);
         assert!(got.iter().zip(&expected).all(|(got, expected)| (got - expected).abs() < 1e-12), "{got:?} {expected:?}");
     }
 }

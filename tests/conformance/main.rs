@@ -21,6 +21,7 @@ mod paper;
 #[rustfmt::skip]
 mod papers;
 mod program;
+mod wrong;
 
 use std::collections::BTreeSet;
 use std::net::TcpListener;
@@ -94,7 +95,10 @@ fn every_rule_has_a_check_and_every_fault_a_rule() {
 }
 
 /// Planted faults that are a mistake of the table, and a part of its description. For the others a cause would be false.
-const CAUSES: [(&str, &str); 16] = [
+const CAUSES: [(&str, &str); 19] = [
+    ("the integral does not reach the effort", "the integral term is missing"),
+    ("the live arm keeps its masses", "the masses of the links are not used"),
+    ("does not wait", "the goal is reached at the first entry"),
     ("division is right-associative", "/ is right-associative"),
     ("minus is right-associative", "- is right-associative"),
     ("ignores parentheses", "parentheses are ignored"),
