@@ -478,7 +478,7 @@ impl Bench {
     /// Passes if the published states of the uncontrolled arm are those that this crate's own arm has after whole
     /// steps from the first one. Returns the number of steps followed.
     pub fn follows(&mut self, arm: &Arm, method: &str, dt: f64) -> Result<usize, String> {
-        let states = self.joints_for(0.4)?;
+        let states = self.joints_for(0.3)?;
         let mut own = states.first().map(Joints::state).ok_or("no joint states")?;
         let mut steps = 0;
         for joints in states.iter().skip(1) {

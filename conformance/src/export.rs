@@ -92,7 +92,7 @@ pub fn junit(results: &Results) -> String {
             let inner = if row.fails() {
                 failures += 1;
                 let cause = row.cause.as_deref().unwrap_or("no known mistake");
-                let told = format!("expected: {}\ngot: {}\ncause: {cause}", row.rule.expected, got(row));
+                let told = format!("expected: {}\ngot: {}\ncause: {cause}\n{}", row.rule.expected, got(row), row.rule.rests_on);
                 format!("<failure message=\"{}\" type=\"rule\">{}</failure>", text(got(row)), text(&told))
             } else if !row.holds() {
                 skipped += 1;

@@ -320,6 +320,21 @@ fn a_used_server_is_not_accused_of_its_user() {
 }
 
 #[test]
+fn a_setting_that_the_server_does_not_take_back_is_told() {
+    let mut calls = 0;
+    let forgets = move |frame: &mut Value| {
+        calls += usize::from(frame["service"] == "/pid_controller/set_gains");
+        if calls > 1 && frame["service"] == "/pid_controller/set_gains" {
+            frame["values"]["kp"][0] = 99.0.into();
+        }
+        true
+    };
+    let results = behind(forgets, &selected("pause-2"));
+    assert!(results.notes.iter().any(|note| note.starts_with("/pid_controller/set_gains is not restored: kp was")), "{:?}", results.notes);
+    assert!(!results.is_good());
+}
+
+#[test]
 fn wrong_equations_are_told_before_the_rules_that_rest_on_them() {
     // As if the arm's links were shorter than it says.
     let program = Runtime::start();

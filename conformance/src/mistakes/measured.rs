@@ -131,7 +131,7 @@ pub(super) fn of_kinematics(bench: &mut Bench) -> Result<Diagnosis, String> {
     bench.set_arm(&arm)?;
     let mut asked = Vec::new();
     for at in 0..8 {
-        let pose: Vec<f64> = [0.4 + 0.3 * f64::from(at), 2.0 - 0.1 * f64::from(at), -0.6].into_iter().take(bench.links).collect();
+        let pose: Vec<f64> = [0.4 + 0.3 * f64::from(at), 2.4 - 0.1 * f64::from(at), -0.6].into_iter().take(bench.links).collect();
         let (x, y, phi) = arm.end_effector(&pose);
         let args = if bench.links == 3 { json!({"x": x, "y": y, "phi": phi}) } else { json!({"x": x, "y": y}) };
         // A wrong solver may reject some targets.
