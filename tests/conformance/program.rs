@@ -157,6 +157,8 @@ fn the_files_have_the_results() {
 fn rules_are_listed_and_a_wrong_number_of_links_is_refused() {
     let listed = out(&conformance(&["--list", "--category", "integrators"]));
     assert_eq!(listed.lines().count(), 34, "{listed}");
+    let strict = out(&conformance(&["--list", "--category", "pid", "--strict-specification"]));
+    assert!(strict.contains("enable-6") && !strict.contains("enable-7"), "{strict}");
     let program = Runtime::start();
     let output = conformance(&[&program.address.to_string(), "--links", "3", "--rule", "gains-1"]);
     assert!(common::complaint(&output, 2).contains("has 2 links instead of 3"));

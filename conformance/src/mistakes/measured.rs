@@ -259,7 +259,3 @@ fn kept(ratio: f64) -> f64 {
         ratio => ratio,
     }
 }
-
-pub(super) fn count() -> usize {
-    OF_TIMES.len() + OF_EXPRESSIONS.len() + 1 + OF_KINEMATICS.len() + OF_LAW.len() + 1
-}

@@ -95,12 +95,6 @@ impl Subject {
     }
 }
 
-/// The number of models, for the document.
-#[must_use]
-pub fn count() -> usize {
-    steps::STEPPERS.len() + steps::COMMON.len() + equations::MISTAKES.len() + measured::count() + 4
-}
-
 /// The largest relative difference; infinite for different lengths.
 fn distance(got: &[f64], model: &[f64]) -> f64 {
     if got.len() != model.len() {
