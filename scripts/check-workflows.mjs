@@ -27,11 +27,12 @@ for (const path of process.argv.slice(2)) {
 }
 
 const RELEASE = readFileSync(".github/workflows/release.yml", "utf8");
+const COURSE = readFileSync("docs/conformance-ci.yml", "utf8");
 const folder = mkdtempSync(join(tmpdir(), "release-"));
 
 /** The exit status of the step with this name, and what it said. */
-function run(name, variables = {}) {
-  const [, first, more] = RELEASE.match(new RegExp(`- name: ${name}\\n +run: (.*)\\n((?: {10}.*\\n)*)`));
+function run(name, variables = {}, workflow = RELEASE) {
+  const [, first, more] = workflow.match(new RegExp(`- name: ${name}\\n +run: (.*)\\n((?: {10}.*\\n)*)`));
   const { status, stdout, stderr } = spawnSync("bash", ["-ec", first === "|" ? more : first], {
     cwd: folder, encoding: "utf8", env: { ...process.env, PATH: `${folder}:${process.env.PATH}`, ...variables },
   });
@@ -40,7 +41,7 @@ function run(name, variables = {}) {
 
 function expect(what, holds, text) {
   if (holds) return;
-  console.error(`release.yml: ${what}: ${text}`);
+  console.error(`workflows: ${what}: ${text}`);
   faults += 1;
 }
 
@@ -62,5 +63,10 @@ expect("a checksum is missing or wrong", sums.status === 0 && sums.stdout.match(
 writeFileSync(join(folder, "gh"), '#!/bin/sh\nfor one; do echo "$one"; done\n', { mode: 0o755 });
 const published = run("Publish the files", { GITHUB_REF_NAME: `v${version}`, GITHUB_REPOSITORY: "somebody/pendularm" });
 expect("not all files are published", files.every((file) => published.text.includes(`dist/${file}\n`)), published.text);
+expect("the workflow for a course installs another version", COURSE.includes(`PENDULARM: pendularm==${version}\n`), version);
+copyFileSync(join(folder, "gh"), join(folder, "pendularm"));
+const tested = run("Test the server", { LINKS: "3", OPTIONS: "--points points.toml" }, COURSE);
+const options = ["--start", "make run", "--links", "3", "--junit", "report.xml", "--html", "report.html", "--points", "points.toml"];
+expect("the options do not reach the program", tested.text === ["conformance", ...options, ""].join("\n"), tested.text);
 rmSync(folder, { recursive: true });
 process.exit(faults ? 1 : 0);

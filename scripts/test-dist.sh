@@ -33,6 +33,7 @@ alone=(chroot "$work/empty")
 "${alone[@]}" /pendularm --version 2>/dev/null || alone=(unshare -r chroot "$work/empty")
 try_program '{"op":"call_service","service":"/ik/solve","args":{"x":1.2,"y":0.5}}' '*"result":true*' \
     "${alone[@]}" /pendularm --bind 127.0.0.1:0 --log off
+[ "$("${alone[@]}" /pendularm conformance --list | grep -c '^method-')" = 8 ] || fail "no rules of conformance"
 
 say "the wheel, in a fresh environment"
 python3 -m venv "$work/environment"

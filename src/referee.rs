@@ -50,6 +50,9 @@ pub struct ConformanceOptions {
     /// Only this rule, such as method-4, or the rules of a section, such as reset
     #[arg(long, value_name = "ID")]
     rule: Option<String>,
+    /// Leave out rules that rest on common sense alone
+    #[arg(long)]
+    strict_specification: bool,
     /// Number of links that the server must have: 2, 3 or auto
     #[arg(long, value_name = "N", default_value = "auto")]
     #[arg(value_parser = ValueReader(|text| one_of(&[("2", 2), ("3", 3), ("auto", ANY)], text)))]
@@ -102,6 +105,7 @@ pub fn run(options: &ConformanceOptions) -> u8 {
         patience: options.timeout,
         category: options.category.clone(),
         rule: options.rule.clone(),
+        is_strict: options.strict_specification,
         links: Some(options.links).filter(|links| *links != ANY),
         ending: Arc::clone(&ending),
         ..Selection::default()

@@ -37,6 +37,9 @@ pub struct Found {
 const SETTINGS: [&str; 5] =
     ["/arm_sim/set_params", "/arm_sim/set_integrator", "/pid_controller/set_gains", "/pid_controller/enable", "/arm_sim/pause"];
 
+/// Most messages that one look at a topic takes, so a server that floods it costs little memory.
+const MOST_MESSAGES: usize = 5000;
+
 /// Services that end a trial, a goal and a motion.
 const ENDING: [&str; 3] = ["/ik_trial/stop", "/ik_action/cancel_goal", "/arm_sim/reset"];
 
@@ -55,7 +58,13 @@ impl Found {
             Some(links) => return Err(format!("the server at {address} has {links} links; the specification has 2 or 3")),
             // A server of the checkpoint needs no arm.
             None if bench.peer.call("/arm_sim/integration_step", &json!({})).is_ok() => 2,
-            None => return Err(format!("the server at {address} tells no number of links: {}", params.err().unwrap_or_default())),
+            None => {
+                let why = params.err().unwrap_or_default();
+                // It has answered the greeting.
+                let closes = why.contains("closed the connection");
+                let what = if closes { "closes the connection after an answer" } else { "tells no number of links" };
+                return Err(format!("the server at {address} {what}: {why}"));
+            }
         };
         let (mut silent, has_arm) = (Vec::new(), by_params.is_some() || state.is_ok());
         let mut ask = |service| {
@@ -305,13 +314,14 @@ impl Bench {
     pub fn messages_for(&mut self, topic: &str, time: Duration) -> Result<Vec<Value>, String> {
         let until = Instant::now() + time;
         let mut found = Vec::new();
-        loop {
+        while found.len() < MOST_MESSAGES {
             match self.peer.find(until, |frame| is_message(frame, topic)) {
                 Ok(mut frame) => found.push(frame.get_mut("msg").map(Value::take).unwrap_or_default()),
-                Err(Trouble::Silence) => return Ok(found),
+                Err(Trouble::Silence) => break,
                 Err(Trouble::Broken(why)) => return Err(why),
             }
         }
+        Ok(found)
     }
 
     /// Discards the received messages on a topic.
@@ -343,7 +353,7 @@ impl Bench {
         self.fresh()?;
         let until = Instant::now() + Duration::from_secs_f64(seconds);
         let mut found = vec![self.joints()?];
-        while Instant::now() < until {
+        while Instant::now() < until && found.len() < MOST_MESSAGES {
             found.push(self.joints()?);
         }
         Ok(found)
@@ -468,7 +478,7 @@ impl Bench {
     /// Passes if the published states of the uncontrolled arm are those that this crate's own arm has after whole
     /// steps from the first one. Returns the number of steps followed.
     pub fn follows(&mut self, arm: &Arm, method: &str, dt: f64) -> Result<usize, String> {
-        let states = self.joints_for(0.4)?;
+        let states = self.joints_for(0.3)?;
         let mut own = states.first().map(Joints::state).ok_or("no joint states")?;
         let mut steps = 0;
         for joints in states.iter().skip(1) {

@@ -38,7 +38,7 @@ pub struct Files {
 /// If there is no server at the address, or if no rule is selected: no rule was tried then. If a file cannot be written.
 pub fn conduct(order: &Order, say: &mut dyn FnMut(&str), progress: &mut dyn FnMut(&str)) -> Result<Results, String> {
     if list(&order.selection).is_empty() {
-        return Err("no rule has this --category and --rule; --list lists all".to_owned());
+        return Err("no rule is left by --category, --rule and --strict-specification; --list lists all".to_owned());
     }
     let launch = order.start.as_ref().map(|command| Launch {
         command: command.clone(),

@@ -30,7 +30,7 @@ pub fn json(results: &Results) -> Value {
         let frames: Vec<Value> = row.frames.iter().map(|frame| json!({"from": side(frame), "frame": frame.1})).collect();
         json!({
             "id": row.rule.id, "category": row.rule.category, "says": row.rule.says, "expected": row.rule.expected,
-            "verdict": verdict(row), "counts": row.rule.counts() && !row.is_aside, "got": got(row), "cause": row.cause,
+            "specification": row.rule.rests_on, "verdict": verdict(row), "counts": row.rule.counts() && !row.is_aside, "got": got(row), "cause": row.cause,
             "needs": row.needs.intersection(&results.lacking).collect::<Vec<_>>(), "frames": frames,
         })
     };
@@ -92,7 +92,7 @@ pub fn junit(results: &Results) -> String {
             let inner = if row.fails() {
                 failures += 1;
                 let cause = row.cause.as_deref().unwrap_or("no known mistake");
-                let told = format!("expected: {}\ngot: {}\ncause: {cause}", row.rule.expected, got(row));
+                let told = format!("expected: {}\ngot: {}\ncause: {cause}\n{}", row.rule.expected, got(row), row.rule.rests_on);
                 format!("<failure message=\"{}\" type=\"rule\">{}</failure>", text(got(row)), text(&told))
             } else if !row.holds() {
                 skipped += 1;
@@ -167,6 +167,9 @@ pub fn html(results: &Results) -> String {
 fn failure(row: &Row) -> String {
     let mut part = format!("<h3 class=\"fails\">{}: {}</h3>\n", row.rule.id, text(row.rule.says));
     let _ = writeln!(part, "<p>Expected: {}.<br>Got: {}.</p>", text(row.rule.expected), text(got(row)));
+    if !row.rule.rests_on.is_empty() {
+        let _ = writeln!(part, "<blockquote>{}</blockquote>", text(row.rule.rests_on));
+    }
     if let Some(cause) = &row.cause {
         let _ = writeln!(part, "<p><strong>Cause: {}.</strong></p>", text(cause));
     }

@@ -1,7 +1,7 @@
 //! The specification's own tests: black box, over TCP, against any server of the protocol.
 //!
-//! A rule is a sentence of the specification, the expected outcome, and a function that checks it. `rules/rules.txt` has
-//! the sentences, and the files in `rules/` have the functions. All follow the sections of the specification. Reference
+//! A rule is a sentence, the expected outcome, the words of the specification that it rests on, and a function that checks
+//! it. `rules/rules.txt` has the texts, and the files in `rules/` have the functions. All follow the sections of the specification. Reference
 //! values come from formulas in this crate (`arm.rs`, `method.rs`), from closed forms and from conservation laws, never
 //! from a server.
 //!
@@ -68,6 +68,8 @@ pub struct Rule {
     pub says: &'static str,
     /// The expected outcome.
     pub expected: &'static str,
+    /// The words of the specification that it rests on. Empty: it rests on common sense alone.
+    pub rests_on: &'static str,
     /// Checks it.
     pub check: fn(&mut Bench) -> Got,
 }
@@ -145,6 +147,8 @@ pub struct Selection {
     pub category: Option<String>,
     /// Rules whose id starts with this text.
     pub rule: Option<String>,
+    /// Leaves out rules that rest on common sense alone.
+    pub is_strict: bool,
     /// The number of links that the server must have. `None`: any.
     pub links: Option<usize>,
     /// Ends the run early once it is true.
@@ -154,7 +158,7 @@ pub struct Selection {
 impl Default for Selection {
     fn default() -> Self {
         let time = Duration::from_secs(180);
-        Self { time, patience: PATIENCE, category: None, rule: None, links: None, ending: Arc::default() }
+        Self { time, patience: PATIENCE, category: None, rule: None, is_strict: false, links: None, ending: Arc::default() }
     }
 }
 
@@ -165,11 +169,12 @@ impl Selection {
         rules::all().filter(|rule| rule.applies_to(links) && self.includes(rule)).collect()
     }
 
-    /// Whether a rule has the selected category and id.
+    /// Whether a rule has the selected category, id and ground.
     #[must_use]
     pub fn includes(&self, rule: &Rule) -> bool {
         let name = rule.category.to_lowercase();
         self.category.as_ref().is_none_or(|part| name.contains(&part.to_lowercase()))
+            && !(self.is_strict && rule.rests_on.is_empty())
             && self.rule.as_ref().is_none_or(|start| rule.id == start || rule.id.starts_with(&format!("{start}-")))
     }
 }

@@ -27,20 +27,22 @@ pub fn failures(results: &Results) -> (Vec<Group<'_>>, Vec<&Row>) {
     if !folded.is_empty() {
         let services: BTreeSet<&String> = folded.iter().flat_map(|row| row.needs.intersection(&results.lacking)).collect();
         let services: Vec<&str> = services.into_iter().map(String::as_str).collect();
-        groups.push((format!("{} need {}, which the server lacks", rules(folded.len()), either(&services)), folded));
+        groups.push((format!("{} {}, which the server lacks", rules(folded.len(), "need"), either(&services)), folded));
     }
     let fails = |id: &str| rest.iter().any(|row| row.rule.id == id);
     if STEPS.iter().all(|id| fails(id)) && EQUATIONS.iter().any(|id| fails(id)) {
         let follows = |row: &&Row| STEPS.contains(&row.rule.id) || FOLLOWING.contains(&row.rule.id);
         let (folded, others): (Vec<&Row>, Vec<&Row>) = rest.into_iter().partition(follows);
         rest = others;
-        groups.push((format!("{} rest on the equations of motion: mend the rules dynamics-2 to -7 first", rules(folded.len())), folded));
+        groups.push((format!("{} on the equations of motion: mend the rules dynamics-2 to -7 first", rules(folded.len(), "rest")), folded));
     }
     (groups, rest)
 }
 
-fn rules(count: usize) -> String {
-    format!("{count} rule{}", if count == 1 { "" } else { "s" })
+/// `1 rule needs`, `2 rules need`.
+fn rules(count: usize, verb: &str) -> String {
+    let (plural, singular) = if count == 1 { ("", "s") } else { ("s", "") };
+    format!("{count} rule{plural} {verb}{singular}")
 }
 
 /// `a, b or c`.

@@ -16,7 +16,12 @@
 #[rustfmt::skip]
 mod common;
 mod causes;
+mod paper;
+#[path = "../support/papers.rs"]
+#[rustfmt::skip]
+mod papers;
 mod program;
+mod wrong;
 
 use std::collections::BTreeSet;
 use std::net::TcpListener;
@@ -90,7 +95,10 @@ fn every_rule_has_a_check_and_every_fault_a_rule() {
 }
 
 /// Planted faults that are a mistake of the table, and a part of its description. For the others a cause would be false.
-const CAUSES: [(&str, &str); 16] = [
+const CAUSES: [(&str, &str); 19] = [
+    ("the integral does not reach the effort", "the integral term is missing"),
+    ("the live arm keeps its masses", "the masses of the links are not used"),
+    ("does not wait", "the goal is reached at the first entry"),
     ("division is right-associative", "/ is right-associative"),
     ("minus is right-associative", "- is right-associative"),
     ("ignores parentheses", "parentheses are ignored"),
@@ -309,6 +317,21 @@ fn a_used_server_is_not_accused_of_its_user() {
     assert!(results.is_good() && results.rows[0].is_aside, "{}", report::summary(&results));
     let why = results.rows[0].got.as_ref().unwrap_err();
     assert!(why.contains("a fresh server"), "{why}");
+}
+
+#[test]
+fn a_setting_that_the_server_does_not_take_back_is_told() {
+    let mut calls = 0;
+    let forgets = move |frame: &mut Value| {
+        calls += usize::from(frame["service"] == "/pid_controller/set_gains");
+        if calls > 1 && frame["service"] == "/pid_controller/set_gains" {
+            frame["values"]["kp"][0] = 99.0.into();
+        }
+        true
+    };
+    let results = behind(forgets, &selected("pause-2"));
+    assert!(results.notes.iter().any(|note| note.starts_with("/pid_controller/set_gains is not restored: kp was")), "{:?}", results.notes);
+    assert!(!results.is_good());
 }
 
 #[test]

@@ -12,8 +12,9 @@ use serde_json::Value;
 
 use crate::common::{self, Runtime, signal};
 
+/// A run that may use 100 MB of memory.
 fn conformance(arguments: &[&str]) -> Output {
-    common::program().arg("conformance").args(arguments).output().unwrap()
+    common::shell("ulimit -d 100000").arg("conformance").args(arguments).output().unwrap()
 }
 
 fn out(output: &Output) -> String {
@@ -69,7 +70,7 @@ fn an_address_without_a_proper_server_gets_a_verdict_within_5_s() {
         (saying(b"what?\r\n"), "no JSON object: what?"),
         (serving(|client| drop(client.take(1 << 30).read_to_end(&mut Vec::new()))), "it gave no answer to a call"),
         (serving(endless), "a line of more than 1048576 bytes"),
-        (serving(answers_once), "the server closed the connection"),
+        (serving(answers_once), "closes the connection after an answer"),
     ];
     thread::scope(|scope| {
         for (address, expected) in cases {
@@ -82,6 +83,36 @@ fn an_address_without_a_proper_server_gets_a_verdict_within_5_s() {
             });
         }
     });
+}
+
+/// The output of a run with some rules against our server behind a fault.
+fn against(fault: Fault, rules: &str) -> String {
+    let program = Runtime::start();
+    let proxy = Proxy::start(&program.address.to_string(), fault).unwrap();
+    out(&conformance(&[&proxy.address, "--rule", rules]))
+}
+
+#[test]
+fn a_server_that_answers_twice_fails_the_rule_on_one_answer_alone() {
+    let twice = |side, frame: Value| vec![frame.clone(); if side == Side::Server && frame["op"] == "service_response" { 2 } else { 1 }];
+    for (rules, holding, failing) in [("envelope", 6, 1), ("checkpoint", 12, 0)] {
+        let said = against(Box::new(twice), rules);
+        assert_eq!((said.matches("ok   ").count(), said.matches("FAIL envelope-1").count()), (holding, failing), "{said}");
+    }
+}
+
+#[test]
+fn a_server_that_sends_100_mb_amid_a_run_gets_a_verdict() {
+    let endless: Fault = Box::new(|side, frame| {
+        let is_it = side == Side::Server && frame["service"] == "/pid_controller/set_gains";
+        vec![if is_it { Value::String("[".repeat(100_000_000)) } else { frame }]
+    });
+    let said = against(endless, "gains-1");
+    assert!(said.contains("/pid_controller/set_gains, which the server lacks: gains-1"), "{said}");
+    // 60,000 messages a second.
+    let flood: Fault = Box::new(|_, frame| vec![frame.clone(); if frame["topic"] == "/joint_states" { 1000 } else { 1 }]);
+    let said = against(flood, "states");
+    assert!(said.contains("ok   states-1"), "{said}");
 }
 
 #[test]
@@ -126,11 +157,13 @@ fn the_files_have_the_results() {
 fn rules_are_listed_and_a_wrong_number_of_links_is_refused() {
     let listed = out(&conformance(&["--list", "--category", "integrators"]));
     assert_eq!(listed.lines().count(), 34, "{listed}");
+    let strict = out(&conformance(&["--list", "--category", "pid", "--strict-specification"]));
+    assert!(strict.contains("enable-6") && !strict.contains("enable-7"), "{strict}");
     let program = Runtime::start();
     let output = conformance(&[&program.address.to_string(), "--links", "3", "--rule", "gains-1"]);
     assert!(common::complaint(&output, 2).contains("has 2 links instead of 3"));
     let output = conformance(&[&program.address.to_string(), "--rule", "no-such-rule"]);
-    assert!(common::complaint(&output, 2).contains("no rule has"));
+    assert!(common::complaint(&output, 2).contains("no rule is left"));
 }
 
 #[cfg(unix)]
@@ -169,9 +202,10 @@ fn an_interrupted_run_restores_the_server_and_a_dead_server_leaves_results() {
         client.call(service, args);
     }
     let before = settings(&program);
+    let json = file("partial");
     let start = |address: String| {
         let mut command = common::program();
-        command.args(["conformance", &address]).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.args(["conformance", &address, "--json", &json]).stdout(Stdio::piped()).stderr(Stdio::piped());
         command.spawn().unwrap()
     };
     let running = start(program.address.to_string());
@@ -188,6 +222,9 @@ fn an_interrupted_run_restores_the_server_and_a_dead_server_leaves_results() {
     assert_eq!(output.status.code(), Some(1));
     assert!(out(&output).contains("note: the server is gone since"), "{}", out(&output));
     assert!(out(&output).contains("\nok "), "{}", out(&output));
+    let partial: Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    let tried = partial["rules"].as_array().unwrap();
+    assert!((1..140).contains(&tried.len()) && tried.iter().any(|rule| rule["verdict"] == "holds"), "{partial}");
 }
 
 #[test]

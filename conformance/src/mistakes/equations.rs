@@ -57,7 +57,7 @@ const fn with(other: Other) -> Equations {
 }
 
 /// All mistakes, with their descriptions.
-pub const MISTAKES: [(&str, Equations); 21] = [
+pub const MISTAKES: [(&str, Equations); 22] = [
     ("gravity has the wrong sign", Equations { gravity: -1.0, ..RIGHT }),
     ("there is no gravity", Equations { gravity: 0.0, ..RIGHT }),
     ("gravity is twice as large", Equations { gravity: 2.0, ..RIGHT }),
@@ -79,12 +79,13 @@ pub const MISTAKES: [(&str, Equations); 21] = [
     ("the Coriolis terms have relative instead of absolute rates", with(Other::RelativeRates)),
     ("the angles are taken for degrees", with(Other::Degrees)),
     ("the lengths of the links are not used", with(Other::Lengths)),
+    ("the masses of the links are not used", with(Other::Masses)),
 ];
 
 impl Equations {
-    /// Joint accelerations without effort.
+    /// Joint accelerations by this effort.
     #[must_use]
-    pub fn acceleration(&self, arm: &Arm, position: &[f64], velocity: &[f64]) -> Vec<f64> {
+    pub fn acceleration(&self, arm: &Arm, position: &[f64], velocity: &[f64], effort: &[f64]) -> Vec<f64> {
         let count = position.len();
         let ones = vec![1.0; count];
         let lengths = if self.other == Other::Lengths { &ones } else { &arm.lengths };
@@ -113,7 +114,7 @@ impl Equations {
             let turning =
                 |a: usize| -> f64 { (0..count).map(|b| inertia(a, b) * (headings[a] - headings[b]).sin() * rates[b] * rates[b]).sum() };
             let last = if self.other == Other::OwnLoad { i + 1 } else { count };
-            let right = -self.coriolis * (i..count).map(turning).sum::<f64>() - (i..last).map(load).sum::<f64>();
+            let right = effort[i] - self.coriolis * (i..count).map(turning).sum::<f64>() - (i..last).map(load).sum::<f64>();
             (0..count).map(|j| entry(i, j)).chain([right]).collect()
         };
         solved((0..count).map(row).collect())

@@ -1,13 +1,38 @@
-//! Mistakes in expressions, in inverse kinematics and in the control law: what each of them makes of a few questions.
+//! Mistakes in times, in expressions, in inverse kinematics, in the control law and in goals: what each of them makes of a few
+//! questions.
 
 use std::f64::consts::{LN_2, PI, TAU};
+use std::time::{Duration, Instant};
 
 use serde_json::json;
 
 use super::{Diagnosis, FLOOR, MEASURED_RATIO, NEAR, RATIO, distance, solution, verdict};
 use crate::arm::Arm;
-use crate::bench::{Bench, shifted};
-use crate::values::largest;
+use crate::bench::{Bench, GRAVITY, shifted};
+use crate::rules::goals;
+use crate::values::{largest, set};
+
+/// The time after `k` steps of `dt`, as a mistake has it.
+type Clock = fn(u32, f64) -> f64;
+
+#[allow(clippy::cast_possible_truncation, reason = "this is one of the mistakes")]
+const OF_TIMES: [(&str, Clock); 5] = [
+    ("the times are one step ahead: the first one is dt instead of 0", |k, dt| f64::from(k + 1) * dt),
+    ("the times are one step behind", |k, dt| (f64::from(k) - 1.0) * dt),
+    ("the times are the numbers of the steps, without dt", |k, _| f64::from(k)),
+    ("the times have single precision (float32)", |k, dt| f64::from((f64::from(k) * dt) as f32)),
+    ("the times are a running sum of single precision (float32)", |k, dt| f64::from((0..k).fold(0.0_f32, |sum, _| sum + dt as f32))),
+];
+
+pub(super) fn of_times(bench: &mut Bench) -> Result<Diagnosis, String> {
+    // No time but the first one is a float32.
+    let (dt, steps) = (0.1, 200);
+    let [got, ..] = bench.integrate("0", [0.0, 0.0, dt], steps, "rk4")?;
+    let by = |clock: Clock| -> Vec<f64> { (0..=steps).map(|k| clock(k, dt)).collect() };
+    let right = by(|k, dt| f64::from(k) * dt);
+    let models = OF_TIMES.iter().map(|(says, clock)| ((*says).to_owned(), distance(&got, &by(*clock)))).collect();
+    Ok(Diagnosis { cause: verdict(distance(&got, &right), models, NEAR, RATIO, FLOOR), plot: Some([right, got]) })
+}
 
 /// Expressions, and their values at t = 0.5.
 const EXPRESSIONS: [(&str, f64); 12] = [
@@ -106,7 +131,7 @@ pub(super) fn of_kinematics(bench: &mut Bench) -> Result<Diagnosis, String> {
     bench.set_arm(&arm)?;
     let mut asked = Vec::new();
     for at in 0..8 {
-        let pose: Vec<f64> = [0.4 + 0.3 * f64::from(at), 1.3 - 0.1 * f64::from(at), -0.6].into_iter().take(bench.links).collect();
+        let pose: Vec<f64> = [0.4 + 0.3 * f64::from(at), 2.4 - 0.1 * f64::from(at), -0.6].into_iter().take(bench.links).collect();
         let (x, y, phi) = arm.end_effector(&pose);
         let args = if bench.links == 3 { json!({"x": x, "y": y, "phi": phi}) } else { json!({"x": x, "y": y}) };
         // A wrong solver may reject some targets.
@@ -155,11 +180,13 @@ const OF_LAW: [(&str, [f64; 8]); 14] = [
     ("neither enable nor reset clears the integral", [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]),
 ];
 
-/// The integral gain: so small that the arm hardly moves.
-const KI: f64 = 0.005;
+/// The integral gain and the position error: so small that the arm hardly moves, and that no limit of the integral is reached, even
+/// if it is summed without the timestep.
+const KI: f64 = 5e-4;
+const ERROR: f64 = 0.01;
 
 pub(super) fn of_law(bench: &mut Bench) -> Result<Diagnosis, String> {
-    let set = |bench: &mut Bench, kp: &[f64], ki: f64, kd: f64| {
+    let set_gains = |bench: &mut Bench, kp: &[f64], ki: f64, kd: f64| {
         let gains = json!({"kp": kp.iter().take(bench.links).collect::<Vec<_>>(), "ki": bench.each(ki), "kd": bench.each(kd)});
         bench.accepted("/pid_controller/set_gains", &gains).map(drop)
     };
@@ -167,7 +194,7 @@ pub(super) fn of_law(bench: &mut Bench) -> Result<Diagnosis, String> {
     let mut got = Vec::new();
     for error in [0.6, 7.0] {
         let pose = bench.float(0.0, 0.0, 0.0)?;
-        set(bench, &GAINS, 0.0, 0.0)?;
+        set_gains(bench, &GAINS, 0.0, 0.0)?;
         bench.hold(&shifted(&pose, error))?;
         let joints = bench.fresh()?;
         for joint in 0..if error < 1.0 { 2 } else { 1 } {
@@ -178,27 +205,50 @@ pub(super) fn of_law(bench: &mut Bench) -> Result<Diagnosis, String> {
     bench.command(&json!([crate::bench::point(&pose, &bench.each(0.5))]))?;
     let joints = bench.fresh()?;
     got.push(at(&joints.effort, 0) / (0.3 * (0.5 - at(&joints.velocity, 0))));
-    bench.swing()?;
-    set(bench, &[0.0; 3], 0.0, 0.1)?;
+    // Gravity moves the arm, because the controller may not. At an equilibrium it has to.
+    bench.enable(false)?;
+    bench.set_gravity(GRAVITY)?;
+    bench.reset()?;
+    std::thread::sleep(Duration::from_millis(250));
+    if largest(&bench.fresh()?.velocity) < 0.1 {
+        bench.swing()?;
+    }
+    set_gains(bench, &[0.0; 3], 0.0, 0.1)?;
     bench.enable(true)?;
     let joints = bench.fresh()?;
     got.push(at(&joints.effort, 0) / (-0.1 * at(&joints.velocity, 0)));
     let pose = bench.float(0.0, KI, 0.0)?;
-    bench.hold(&shifted(&pose, 1.0))?;
+    bench.hold(&shifted(&pose, ERROR))?;
     let states = bench.joints_for(0.8)?;
     let [begin, .., end] = states.as_slice() else { return Err("no joint states".to_owned()) };
-    let mean = 1.0 + at(&pose, 0) - 0.5 * (at(&begin.position, 0) + at(&end.position, 0));
+    let mean = ERROR + at(&pose, 0) - 0.5 * (at(&begin.position, 0) + at(&end.position, 0));
     got.push((at(&end.effort, 0) - at(&begin.effort, 0)) / (KI * mean * (end.stamp - begin.stamp)));
-    let wound = largest(&end.effort).max(0.1 * KI);
+    let least = 0.1 * KI * ERROR;
+    let wound = largest(&end.effort).max(least);
     bench.enable(false)?;
     bench.enable(true)?;
     got.push(kept(largest(&bench.fresh()?.effort) / wound));
-    std::thread::sleep(std::time::Duration::from_millis(500));
-    let wound = largest(&bench.fresh()?.effort).max(0.1 * KI);
+    std::thread::sleep(Duration::from_millis(500));
+    let wound = largest(&bench.fresh()?.effort).max(least);
     bench.reset()?;
     got.push(kept(largest(&bench.fresh()?.effort) / wound));
     let models = OF_LAW.iter().map(|(says, model)| ((*says).to_owned(), distance(&got, model))).collect();
     Ok(Diagnosis { cause: verdict(distance(&got, &LAW), models, 0.05, MEASURED_RATIO, 0.02), plot: None })
+}
+
+/// The stay in the experiment on goals [s].
+const STAY: f64 = 1.0;
+
+pub(super) fn of_dwell(bench: &mut Bench) -> Result<Diagnosis, String> {
+    let mut goal = goals::wide(bench);
+    set(&mut goal, "success_hold", json!(STAY));
+    goals::listen(bench)?;
+    let began = Instant::now();
+    let id = bench.send_goal(&goal)?;
+    goals::result(bench, &id, Duration::from_secs_f64(3.0 * STAY))?;
+    let got = kept(began.elapsed().as_secs_f64() / STAY);
+    let models = vec![("the goal is reached at the first entry, without the stay of success_hold".to_owned(), distance(&[got], &[0.0]))];
+    Ok(Diagnosis { cause: verdict(distance(&[got], &[1.0]), models, 0.05, MEASURED_RATIO, 0.02), plot: None })
 }
 
 /// Whether an effort is left, as 0 or 1: its size depends on the time until it is read.
@@ -208,8 +258,4 @@ fn kept(ratio: f64) -> f64 {
         ratio if ratio > 0.7 => 1.0,
         ratio => ratio,
     }
-}
-
-pub(super) fn count() -> usize {
-    OF_EXPRESSIONS.len() + 1 + OF_KINEMATICS.len() + OF_LAW.len()
 }

@@ -137,7 +137,7 @@ pub const CHECKS: &[Check] = &[
         wound_up(bench, 500)?;
         bench.pause(true)?;
         let before = bench.fresh()?.effort;
-        sleep(Duration::from_secs(1));
+        sleep(Duration::from_millis(700));
         bench.pause(false)?;
         let after = bench.fresh()?.effort;
         changes(&before, &after, |before, after| before > 0.0 && after < 1.7 * before)

@@ -49,7 +49,7 @@ pub const CHECKS: &[Check] = &[
         let arm = uneven(bench.links);
         bench.set_arm(&arm)?;
         bench.swing()?;
-        let states: Vec<_> = bench.joints_for(0.8)?.iter().map(Joints::state).collect();
+        let states: Vec<_> = bench.joints_for(0.5)?.iter().map(Joints::state).collect();
         let kinetic: Vec<f64> = states.iter().map(|state| arm.kinetic(state)).collect();
         let total: Vec<f64> = states.iter().zip(&kinetic).map(|(state, kinetic)| kinetic + arm.potential(&state.position)).collect();
         let exchanged = deviation(&kinetic, 1.0);
@@ -63,7 +63,7 @@ pub const CHECKS: &[Check] = &[
         arm.gravity = 0.0;
         bench.set_arm(&arm)?;
         bench.swing()?;
-        let momenta: Vec<f64> = bench.joints_for(0.8)?.iter().map(|joints| arm.momentum(&joints.state())).collect();
+        let momenta: Vec<f64> = bench.joints_for(0.5)?.iter().map(|joints| arm.momentum(&joints.state())).collect();
         let size = largest(&momenta);
         must(size > 0.1, || format!("an angular momentum of {size:.4} only"))?;
         let error = deviation(&momenta, size);

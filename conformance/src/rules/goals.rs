@@ -151,7 +151,7 @@ fn endless(bench: &Bench) -> Value {
 }
 
 /// Subscribes to feedback and results, and enables a controller that can hold the arm.
-fn listen(bench: &mut Bench) -> Result<(), String> {
+pub(crate) fn listen(bench: &mut Bench) -> Result<(), String> {
     bench.set_holding_gains(true)?;
     bench.enable(true)?;
     bench.watch(FEEDBACK)?;
@@ -177,7 +177,7 @@ fn active(bench: &mut Bench) -> Result<(Value, String), String> {
 }
 
 /// The result of a goal.
-fn result(bench: &mut Bench, id: &str, within: Duration) -> Result<Value, String> {
+pub(crate) fn result(bench: &mut Bench, id: &str, within: Duration) -> Result<Value, String> {
     bench.message_that(RESULT, within, &format!("the result of goal {id}"), |msg| is_of(msg, id))
 }
 
@@ -216,6 +216,6 @@ fn has_target(bench: &Bench, msg: &Value, goal: &Value) -> Result<(), String> {
 }
 
 /// A goal that is reached wherever the arm is.
-fn wide(bench: &Bench) -> Value {
+pub(crate) fn wide(bench: &Bench) -> Value {
     goal_at(bench, [0.5, -0.4, 0.3], &json!({"epsilon": 10.0, "success_hold": 0.0}))
 }

@@ -13,7 +13,8 @@ pub mod trials;
 
 use crate::Rule;
 
-/// A heading names a category. A row has the id, with the number of links if the rule is for one, the rule and the expected outcome.
+/// A heading names a category. A row has the id, with the number of links if the rule is for one, the rule, the expected outcome,
+/// and the words of the specification, unless the rule rests on common sense alone.
 const RULES: &str = include_str!("rules.txt");
 
 /// All rules, in the order of the specification's sections.
@@ -24,12 +25,12 @@ pub fn all() -> impl Iterator<Item = Rule> {
             category = name;
             return None;
         }
-        let mut cells = line.split(" | ");
+        let mut cells = line.splitn(4, " | ");
         let (head, says, expected) = (cells.next()?, cells.next()?, cells.next()?);
         let (id, links) = head.split_once(" (").unwrap_or((head, ""));
         let links = links.strip_suffix(" links)").and_then(|links| links.parse().ok());
         let (_, check) = checks().find(|(name, _)| *name == id)?;
-        Some(Rule { id, category, links, says, expected, check: *check })
+        Some(Rule { id, category, links, says, expected, rests_on: cells.next().unwrap_or_default(), check: *check })
     })
 }
 

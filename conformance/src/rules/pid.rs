@@ -135,7 +135,7 @@ pub const CHECKS: &[Check] = &[
         let pose = bench.float(0.0, SMALL, 0.0)?;
         let setpoint = shifted(&pose, 1.0);
         bench.hold(&setpoint)?;
-        let states = bench.joints_for(0.8)?;
+        let states = bench.joints_for(0.5)?;
         let [first, .., last] = states.as_slice() else { return Err("no joint states".to_owned()) };
         let grown: Vec<f64> = minus(&last.effort, &first.effort).iter().map(|change| change / SMALL).collect();
         let mut sum = bench.each(0.0);
