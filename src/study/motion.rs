@@ -2,7 +2,7 @@
 //!
 //! If a link turns too far within a step, the method adds energy, the arm turns faster still, and the run finally
 //! diverges. The onset depends only on the rotation per step, `h Ω`, with Ω the speed of the fastest link.
-//! [`max_rotation`] is the measured limit of each method.
+//! `max_rotation` is the measured limit of each method.
 //!
 //! | motion | speed Ω assumed |
 //! | --- | --- |
