@@ -7,14 +7,14 @@ use numpy::{
     Element, IntoPyArray, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::{PyMemoryError, PyOverflowError};
+use pyo3::exceptions::{PyMemoryError, PyOverflowError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
 use crate::fields::{
     Bound, Held, MOST_LISTED, Object, Real, beyond, has_booleans, held, is_masked, is_too_long,
-    refused, shown,
+    refused, shown, wrong_type,
 };
 
 /// An empty vector with capacity for `count` entries.
@@ -82,10 +82,13 @@ impl<'py> ArrayArgument<'py> {
                 if why.is_instance_of::<PyMemoryError>(value.py()) {
                     return why;
                 }
-                refused(format_args!(
-                    "{field} must be an array of numbers, got {}",
-                    shown(value)
-                ))
+                let said = format!("{field} must be an array of numbers, got {}", shown(value));
+                // NumPy refuses rows of different lengths by a ValueError.
+                if why.is_instance_of::<PyValueError>(value.py()) {
+                    refused(said)
+                } else {
+                    wrong_type(said)
+                }
             })?,
         };
         let array = laid_out(&array)?.try_readonly().map_err(|_| {
@@ -182,7 +185,7 @@ fn is_writeable(array: &Object<'_>) -> PyResult<bool> {
 pub(crate) fn as_doubles<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     let py = value.py();
     if has_booleans(value)? {
-        return Err(refused(shown(value)));
+        return Err(wrong_type(shown(value)));
     }
     let numpy = py.import("numpy")?;
     let array = numpy.call_method1("asarray", (value,))?;
@@ -194,7 +197,7 @@ pub(crate) fn as_doubles<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArray
             if let Real::Other(one) = one
                 && !one.is_beyond
             {
-                return Err(refused(one));
+                return Err(wrong_type(one));
             }
         }
         numpy.call_method1("asarray", (array, "float64"))?

@@ -15,6 +15,7 @@ mod floats;
 mod gains;
 mod held;
 mod patience;
+mod robot;
 mod simulation;
 mod state;
 mod study;
@@ -47,5 +48,5 @@ mod native {
     #[pymodule_export]
     use crate::simulation::{Divergence, Simulation};
     #[pymodule_export]
-    use crate::study::{plan, rollout, stability, suggest_gains};
+    use crate::study::{linearize, plan, rollout, stability, suggest_gains};
 }

@@ -8,7 +8,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from . import dynamics
-from ._fields import Floats, number, shown
+from ._fields import Floats, Method, number, shown
 from ._native import Arm, Batch, end_effector
 
 Observation = NDArray[np.float32]
@@ -43,9 +43,9 @@ class Task:
     most_steps: ClassVar[int]
     """Default number of steps after which an episode is truncated."""
 
-    def __init__(self, arms: int, links: int, threads: int | None, method: str, timestep: float) -> None:
+    def __init__(self, arms: int, links: int, threads: int | None, method: Method, timestep: float) -> None:
         if not isinstance(method, str):
-            raise ValueError(f"method must be the name of a method, got {shown(method)}")
+            raise TypeError(f"method must be the name of a method, got {shown(method)}")
         self.substeps = _substeps(number("timestep", timestep))
         self.batch = Batch(arms, links, threads=threads)
         self.batch.set_integrator(method, STEP / self.substeps)

@@ -23,7 +23,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ._fields import Floats, as_array, promised, read_seeds, shown, whole_number
+from ._fields import Floats, Method, as_array, promised, read_seeds, shown, whole_number
 from ._native import is_masked
 from ._render import METADATA, Frame, Renderer
 from ._tasks import TIMESTEP, Action, Observation, Reach, SwingUp, Task
@@ -53,9 +53,9 @@ def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
     return array
 
 
-def _named(refusal: ValueError, theirs: str, ours: str) -> ValueError:
+def _named(refusal: Exception, theirs: str, ours: str) -> Exception:
     """Renames the field in a refusal of the batch to the caller's name."""
-    return ValueError(str(refusal).replace(theirs, ours, 1))
+    return type(refusal)(str(refusal).replace(theirs, ours, 1))
 
 
 def _need_reset(call: str, has_begun: bool) -> None:
@@ -97,7 +97,7 @@ class _Single(_States, gymnasium.Env[Observation, Action]):
     def __init__(
         self,
         links: int = 2,
-        method: str = "rk4",
+        method: Method = "rk4",
         timestep: float = TIMESTEP,
         render_mode: str | None = None,
     ) -> None:
@@ -124,7 +124,7 @@ class _Single(_States, gymnasium.Env[Observation, Action]):
         action = _checked("action", action, self.action_space)
         try:
             self._task.go_on(action[None])
-        except ValueError as refusal:
+        except (TypeError, ValueError) as refusal:
             raise _named(refusal, "effort[0]", "action") from None
         self._picture.update(np.zeros(1, np.bool_))
         return self._task.observe()[0], float(self._task.reward()[0]), bool(self._task.lost()[0]), False, {}
@@ -152,7 +152,7 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
         links: int = 2,
         max_episode_steps: int | None = None,
         threads: int | None = None,
-        method: str = "rk4",
+        method: Method = "rk4",
         timestep: float = TIMESTEP,
         render_mode: str | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
@@ -164,7 +164,7 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
             raise ValueError(f"max_episode_steps must be at least 1, or -1 for no limit, got {shown(most_steps)}")
         try:
             self._task = self.task_of(num_envs, links, threads, method, timestep)
-        except ValueError as refusal:
+        except (TypeError, ValueError) as refusal:
             raise _named(refusal, "n_arms", "num_envs") from None
         # The largest number means no limit in practice.
         self._most_steps = sys.maxsize if most_steps == -1 else min(most_steps, sys.maxsize)
@@ -208,7 +208,7 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
     ) -> tuple[Observation, dict[str, Any]]:
         mask = np.ones(self.num_envs, np.bool_)
         if not isinstance(options, Mapping | None):
-            raise ValueError(f"options must be a dict or None, got {shown(options)}")
+            raise TypeError(f"options must be a dict or None, got {shown(options)}")
         if options and "reset_mask" in options:
             given = options["reset_mask"]
             if is_masked(given):
@@ -244,7 +244,7 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
         actions = np.where(again[:, None], 0, _checked("actions", actions, self.action_space))
         try:
             self._task.go_on(actions)
-        except ValueError as refusal:
+        except (TypeError, ValueError) as refusal:
             raise _named(refusal, "effort", "actions") from None
         self._elapsed += 1
         rewards, lost = self._task.reward(), self._task.lost()
