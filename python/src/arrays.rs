@@ -140,6 +140,28 @@ impl<'py> ArrayArgument<'py> {
         self.checked(1, shape.is_empty(), bound)
     }
 
+    /// The numbers as a list.
+    pub(crate) fn list(&self, bound: Bound) -> PyResult<&[f64]> {
+        if self.shape().len() != 1 {
+            return Err(refused(format_args!(
+                "{} must have the shape (n,), got {}",
+                self.field,
+                in_python(self.shape())
+            )));
+        }
+        Ok(self.checked(1, false, bound)?.values)
+    }
+
+    /// The numbers as one finite row of `N`, or as some.
+    pub(crate) fn each<const N: usize>(&self) -> PyResult<Vec<[f64; N]>> {
+        let count = match self.shape() {
+            [count, _] => *count,
+            _ => 1,
+        };
+        let rows = self.rows(Some(count), N, Bound::Finite)?;
+        collected(count, (0..count).map(|row| rows.row(row)))
+    }
+
     /// The numbers as rows of this width, all within a bound.
     fn checked(&self, width: usize, is_one: bool, bound: Bound) -> PyResult<Rows<'_>> {
         let values = self.array.as_slice()?;

@@ -177,6 +177,13 @@ impl Reader<'_> {
         Some(joints)
     }
 
+    fn state<const N: usize>(&mut self) -> Option<State<N>> {
+        Some(State {
+            position: self.joints(Bound::Finite)?,
+            velocity: self.joints(Bound::Finite)?,
+        })
+    }
+
     /// A choice by its index.
     fn choice<T: Copy>(&mut self, all: &[T]) -> Option<T> {
         all.get(usize::try_from(self.whole()?).ok()?).copied()
@@ -229,29 +236,18 @@ impl Reader<'_> {
             command,
             driven: is_driven.then_some(driven),
         };
-        let state = State {
-            position: joints()?,
-            velocity: joints()?,
-        };
-        let carry = State {
-            position: joints()?,
-            velocity: joints()?,
-        };
-        let (effort_of_step, push) = (joints()?, joints()?);
+        let (state, carry) = (self.state()?, self.state()?);
+        let (effort_of_step, push) = (self.joints(Bound::Finite)?, self.joints(Bound::Finite)?);
         let viscous = self.joints(Bound::NotNegative)?;
         let limit = self.joints(Bound::Limit)?;
         let encoder_step = self.joints(Bound::NotNegative)?;
-        let mut joints = || self.joints(Bound::Finite);
-        let measured = State {
-            position: joints()?,
-            velocity: joints()?,
-        };
+        let measured = self.state()?;
         let mut memory = Memory {
             measured: has_measured.then_some(measured),
             ..Memory::default()
         };
         for waiting in &mut memory.waiting {
-            *waiting = joints()?;
+            *waiting = self.joints(Bound::Finite)?;
         }
         let arm = Arm::new(lengths, masses, gravity).ok()?;
         let checkpoint = Checkpoint {

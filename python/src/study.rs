@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use pendularm::math::arm::{Arm as Rods, State};
+use pendularm::math::count::{in_f64, steps_in, whole};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::study::clocks::{ClockLimits, clock_limits};
 use pendularm::study::control_loop::ControlLoop;
@@ -17,13 +18,13 @@ use pendularm::study::linear::Linear;
 use pendularm::study::motion::{FREE_SECONDS, Motion};
 use pendularm::study::paused::Paused;
 use pendularm::study::planner::{self, Planned, Task};
-use pendularm::study::rollout::{Rollout, RolloutRequest, rollout as rollout_of};
+use pendularm::study::rollout::{Course, MAX_STEPS, Rollout, RolloutRequest, rollout_along};
 use pendularm::study::stability::{Limits, search_limits};
 use pyo3::prelude::{FromPyObject, PyAnyMethods, PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
 use crate::arm::{Given, for_either, or_default};
-use crate::arrays::{joints, joints_or, room};
+use crate::arrays::{ArrayArgument, collected, joints, joints_or, room};
 use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
 use crate::floats::Promised;
 use crate::gains;
@@ -186,6 +187,9 @@ pub(crate) struct RolloutArguments<'py> {
     samples: Whole,
     reference: Flag,
     controller: Flag,
+    t_eval: Option<Object<'py>>,
+    effort: Option<Object<'py>>,
+    return_reference: Flag,
 }
 
 #[pyfunction]
@@ -194,10 +198,20 @@ pub(crate) fn rollout<'py>(py: Python<'py>, arguments: Object<'py>) -> PyResult<
     let _floats = Promised::begin();
     let robot: Robot<'_> = arguments.extract()?;
     let arguments: RolloutArguments<'_> = arguments.extract()?;
-    let duration = arguments.duration.read("duration")?;
+    let mut duration = arguments.duration.read("duration")?;
     let timestep = arguments.timestep.read("timestep")?;
-    let samples = arguments.samples.read("samples")?;
-    let reference = arguments.reference.read("reference")?;
+    let mut samples = arguments.samples.read("samples")?;
+    let keeps_reference = arguments.return_reference.read("return_reference")?;
+    let reference = arguments.reference.read("reference")? || keeps_reference;
+    let mut sampled = vec![];
+    if let Some(times) = &arguments.t_eval {
+        let times = ArrayArgument::read("t_eval", times)?;
+        (sampled, duration) = read_times(times.list(Bound::NotNegative)?, timestep)?;
+        samples = u64::try_from(sampled.len()).unwrap_or(u64::MAX).max(2);
+    }
+    let efforts = arguments.effort.as_ref();
+    let efforts = efforts.map(|effort| ArrayArgument::read("effort", effort));
+    let efforts = efforts.transpose()?;
     let law = (
         arguments.controller,
         arguments.gains.as_ref(),
@@ -205,7 +219,12 @@ pub(crate) fn rollout<'py>(py: Python<'py>, arguments: Object<'py>) -> PyResult<
     );
     let method = arguments.method.method("method")?;
     for_either!(or_default(arguments.arm)?, arm => {
-        run(py, RolloutRequest {
+        let course = Course {
+            sampled,
+            efforts: efforts.as_ref().map_or(Ok(vec![]), ArrayArgument::each)?,
+            keeps_reference,
+        };
+        run(py, course, RolloutRequest {
             control: robot.of(read_loop(arm, law)?.with_method(method).with_timestep(timestep))?,
             start: read_state(arguments.q.as_ref(), arguments.qd.as_ref())?,
             duration,
@@ -216,17 +235,23 @@ pub(crate) fn rollout<'py>(py: Python<'py>, arguments: Object<'py>) -> PyResult<
 }
 
 /// Makes the run alone, which is timed, and repeats it beside its reference, if one is requested.
-fn run<const N: usize>(py: Python<'_>, request: RolloutRequest<N>) -> PyResult<Held<'_, PyDict>> {
+fn run<const N: usize>(
+    py: Python<'_>,
+    course: Course<N>,
+    request: RolloutRequest<N>,
+) -> PyResult<Held<'_, PyDict>> {
     let steps = request.steps().map_err(refused)?;
     // More memory than two runs and the answer need. It is checked first, because the run's vectors
     // abort without memory.
     let samples = usize::try_from(request.samples.min(steps + 1)).unwrap_or(usize::MAX);
+    let samples = samples.max(course.sampled.len()) + course.efforts.len();
     drop(room::<[f64; 80]>(samples)?);
     let mut took = Duration::ZERO;
-    let mut alone = Paused::new(rollout_of(RolloutRequest {
+    let own = RolloutRequest {
         reference: false,
         ..request
-    }));
+    };
+    let mut alone = Paused::new(rollout_along(own, course.clone()));
     let mut made = until_done(py, || {
         let began = Instant::now();
         let made = alone.advance();
@@ -234,10 +259,28 @@ fn run<const N: usize>(py: Python<'_>, request: RolloutRequest<N>) -> PyResult<H
         made
     })?;
     if request.reference {
-        let mut compared = Paused::new(rollout_of(request));
+        let mut compared = Paused::new(rollout_along(request, course));
         made = until_done(py, || compared.advance())?;
     }
     listed_run(py, &made.map_err(refused)?, took)
+}
+
+/// The steps nearest to some times [s], which do not decrease, and the last time.
+fn read_times(times: &[f64], timestep: f64) -> PyResult<(Vec<u64>, f64)> {
+    let pairs = times.iter().zip(times.iter().skip(1));
+    if let Some((before, after)) = pairs.into_iter().find(|(before, after)| after < before) {
+        return Err(refused(format_args!(
+            "t_eval must not decrease, got {after} after {before}"
+        )));
+    }
+    let last = times.last().copied();
+    let last = last.ok_or_else(|| refused("t_eval must have at least one time, got none"))?;
+    let most = in_f64(MAX_STEPS);
+    // Wrong timesteps, and too many steps, are refused by the run.
+    let steps = times
+        .iter()
+        .map(|&time| steps_in(time, timestep).round().clamp(0.0, most));
+    Ok((collected(times.len(), steps.map(whole))?, last))
 }
 
 fn listed_run<'py, const N: usize>(
@@ -267,6 +310,14 @@ fn listed_run<'py, const N: usize>(
     found.set_item("sampling_error", known(sampling))?;
     found.set_item("sampling_error_uncertainty", known(sampling_uncertainty))?;
     found.set_item("divergence", divergence)?;
+    let states = run.reference.iter();
+    let (positions, velocities): (Vec<_>, Vec<_>) =
+        states.map(|state| (state.position, state.velocity)).unzip();
+    let given = (!positions.is_empty()).then_some(());
+    let positions = given.map(|()| rows(&positions)).transpose()?;
+    let velocities = given.map(|()| rows(&velocities)).transpose()?;
+    found.set_item("reference_positions", positions)?;
+    found.set_item("reference_velocities", velocities)?;
     Ok(found)
 }
 

@@ -56,7 +56,7 @@ def test_a_rollout_is_the_services_and_the_simulations(runtime, links):
     ours = plain(run)
     assert run.wall_time > 0
     assert ours["divergence"] is None
-    del ours["wall_time"], theirs["wall_time"]
+    del ours["wall_time"], theirs["wall_time"], ours["reference_positions"], ours["reference_velocities"]
     assert ours == theirs
 
     arm = pendularm.Simulation(
@@ -67,6 +67,47 @@ def test_a_rollout_is_the_services_and_the_simulations(runtime, links):
     arm.enable()
     arm.step(400)
     assert run.positions[-1].tolist() == arm.position.tolist()
+
+
+def test_samples_are_at_the_times_that_are_asked_for(links):
+    arm, times = pendularm.Arm(links), [0.0, 0.0104, 0.0106, 0.5]
+    run = pendularm.rollout(arm, t_eval=times, timestep=0.001)
+    every = pendularm.rollout(arm, duration=0.5, samples=501)
+    assert run.times.tolist() == [0.0, 0.01, 0.011, 0.5]
+    assert run.positions.tolist() == every.positions[[0, 10, 11, 500]].tolist()
+    assert run.evaluations == every.evaluations
+    assert run.reference_positions is None and run.reference_velocities is None
+
+
+def test_an_effort_is_an_array_or_a_function_and_the_reference_has_it_too(links):
+    arm, start = pendularm.Arm(links), [0.3] * links
+    asked = {"duration": 0.41, "samples": 42, "control_period": 0.02, "q": start, "effort_limit": [9.0] * links}
+    seen = []
+
+    def law(t, q, qd):
+        seen.append([t, *q, *qd])
+        return pendularm.dynamics.gravity_load(arm, q) - 5.0 * q - qd
+
+    run = pendularm.rollout(arm, effort=law, return_reference=True, **asked)
+    one = pendularm.Simulation(arm, control_period=0.02, effort_limit=[9.0] * links)
+    one.set_state(start)
+    rows = []
+    for period in range(21):
+        assert seen[period] == [one.time, *one.position, *one.velocity]
+        rows.append(law(one.time, one.position, one.velocity))
+        one.step(min(20, 410 - one.steps), rows[-1])
+    assert len(seen) == 42
+    assert run.positions[-1].tolist() == one.position.tolist()
+    assert run.efforts[-1].tolist() == one.effort.tolist()
+    assert pendularm.rollout(arm, effort=rows, **asked).positions.tolist() == run.positions.tolist()
+    assert run.reference_positions.shape == run.reference_velocities.shape == (42, links)
+    assert np.abs(run.reference_positions - run.positions).max() < 1e-9
+    assert np.isnan(run.sampling_error)
+    # A larger timestep has a larger error, which is that of the samples.
+    coarse = pendularm.rollout(arm, effort=rows, return_reference=True, timestep=0.01, method="euler", **asked)
+    assert coarse.error == np.abs(coarse.reference_positions - coarse.positions).max() > 1e-4
+    held = pendularm.rollout(arm, effort=[1.0] * links, **asked)
+    assert (held.efforts[1:] == 1.0).all()
 
 
 def test_a_rollout_that_diverges_says_where():

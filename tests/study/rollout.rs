@@ -4,10 +4,13 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
 use pendularm::math::integrator::{Method, increment};
 use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::ControlPeriod;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::estimate;
 use pendularm::study::paused::{Paused, at_once};
-use pendularm::study::rollout::{MAX_SAMPLES, Rollout, RolloutRequest, rollout};
+use pendularm::study::rollout::{
+    Course, MAX_SAMPLES, Rollout, RolloutRequest, rollout, rollout_along,
+};
 use pendularm::study::taylor::TaylorReference;
 
 use crate::stored::gains;
@@ -73,6 +76,50 @@ fn a_run_has_the_nearest_number_of_steps() {
     assert_eq!(times(0.5, 0.1, 3), [0.0, 3.0, 5.0]);
     // More samples than steps: one a step.
     assert_eq!(times(0.3, 0.1, MAX_SAMPLES), [0.0, 1.0, 2.0, 3.0]);
+}
+
+/// The law's own efforts, given from outside, move the arm in the same way. The reference follows them closely.
+#[test]
+fn given_efforts_replace_the_law_and_samples_are_at_the_given_steps() {
+    let held = ControlPeriod {
+        period: 0.004,
+        delay: 0,
+    };
+    let mut request = controlled(Gains::default(), 0.001);
+    request.control = request.control.with_period(held);
+    request.duration = 0.4;
+    request.samples = 401;
+    let law = run(request);
+    let course = Course {
+        sampled: vec![0, 7, 7, 300],
+        efforts: law.efforts[1..].iter().step_by(4).copied().collect(),
+        keeps_reference: true,
+    };
+    let request = RolloutRequest {
+        control: ControlLoop::free(request.control.arm)
+            .with_timestep(0.001)
+            .with_period(held),
+        reference: true,
+        ..request
+    };
+    let made = at_once(rollout_along(request, course)).unwrap();
+    assert_eq!(made.times, [0.0, 7.0 * 0.001, 7.0 * 0.001, 300.0 * 0.001]);
+    assert_eq!(made.positions[1..], [7, 7, 300].map(|at| law.positions[at]));
+    assert_eq!(made.efforts[3], law.efforts[300]);
+    assert_eq!(made.from_ideal, None);
+    let last = (made.reference[3].position, made.positions[3]);
+    let apart = (0..2).map(|joint| (last.0[joint] - last.1[joint]).abs());
+    assert_eq!(made.deviation.unwrap().error, apart.fold(0.0, f64::max));
+    assert!(made.deviation.unwrap().error < 1e-6);
+
+    // The last effort acts for the rest.
+    let constant = Course {
+        efforts: vec![[3.0, 1.0]],
+        ..Course::default()
+    };
+    let made = at_once(rollout_along(request, constant)).unwrap();
+    assert!(made.efforts[1..].iter().all(|effort| *effort == [3.0, 1.0]));
+    assert!(made.reference.is_empty());
 }
 
 /// The two references agree to rounding: a second of this motion amplifies errors some ten times.

@@ -5,16 +5,16 @@ Long computations release the interpreter's lock, and Ctrl-C ends them. An answe
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, SupportsIndex, TypedDict
+from typing import TYPE_CHECKING, Any, SupportsIndex, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from ._fields import AntiWindup, Floats, Method, VelocitySource, made, present_name, renamed
-from ._native import Arm
+from ._fields import AntiWindup, Floats, Method, VelocitySource, made, number, present_name, renamed, shown
+from ._native import Arm, Simulation, as_doubles
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -117,6 +117,10 @@ class Rollout:
     """Largest distance of two runs of that loop from each other [rad]."""
     divergence: tuple[int, float] | None
     """Step and time [s] of a divergence, if there was one. The samples end before it."""
+    reference_positions: Floats | None
+    """Positions of the reference [rad], (samples, links), if they were requested; `nan` once it is lost."""
+    reference_velocities: Floats | None
+    """[rad/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,6 +269,9 @@ def rollout(
     samples: int = 1001,
     reference: bool | np.bool_ = False,
     controller: bool | np.bool_ = True,
+    t_eval: ArrayLike | None = None,
+    effort: ArrayLike | Callable[[float, Floats, Floats], ArrayLike] | None = None,
+    return_reference: bool | np.bool_ = False,
     **robot: Unpack[Robot],
 ) -> Rollout:
     """Runs an arm offline with the live arm's own steps, as ``/study/rollout`` does.
@@ -273,9 +280,40 @@ def rollout(
     to the nearest number of timesteps. The result has `samples`, including start and end, or every step if there are
     fewer. `gains` and `setpoint` are those of `stability`. Without `controller` the arm is free, and both are refused.
     With `reference` the run is compared with the true motion under the same held control law, and with the loop whose law
-    acts at every instant. `robot` has control period, delay, motors and sensors, as `Simulation` takes them.
+    acts at every instant. `return_reference` adds the samples of the true motion.
+
+    `t_eval` [s] has the times of the samples, in place of `duration` and `samples`. Each sample is at the nearest step.
+
+    `effort` [N m] acts in place of the controller: (links,) all the time, (periods, links) with a row for each control
+    period, or a function `effort(t, q, qd)`, called once per control period. The last row also acts later. The reference has
+    the same efforts. `robot` has control period, delay, motors and sensors, as `Simulation` takes them. An `effort` has no
+    delay and no sensors.
     """
-    return made(Rollout, _native.rollout(_arguments(locals())))
+    given = _arguments(locals())
+    if effort is not None:
+        for name in ("gains", "setpoint"):
+            if given[name] is not None:
+                raise ValueError(f"{name} has no effect with an effort, got {shown(given[name])}")
+        given["controller"] = False
+        if callable(effort):
+            given["effort"] = _played(effort, given)
+    return made(Rollout, _native.rollout(given))
+
+
+def _played(effort: Callable[[float, Floats, Floats], ArrayLike], given: Mapping[str, Any]) -> list[Floats]:
+    """The efforts of a function in a run, one for each control period."""
+    names = ("arm", "method", "timestep", "control_period", "effort_limit")
+    run = Simulation(**{name: given[name] for name in names})
+    start = [np.zeros(run.links) if given[name] is None else given[name] for name in ("q", "qd")]
+    run.set_state(*start)
+    end = given["duration"] if given["t_eval"] is None else np.max(given["t_eval"], initial=0.0)
+    most = min(number("duration", end) / run.timestep, 1e7)
+    each, found = round(run.effective_control_period / run.timestep), []
+    while run.steps < most and run.divergence is None:
+        row = as_doubles(effort(run.time, run.position, run.velocity))
+        found.append(row)
+        run.step(each, row)
+    return found
 
 
 @renamed
