@@ -3,13 +3,14 @@
 import functools
 import itertools
 import json
+import multiprocessing
 import os
 import pickle
 import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -397,6 +398,55 @@ def test_processes_may_do_the_work():
     with ProcessPoolExecutor(2) as executor:
         found = pendularm.sweep(GRID, "final_error", executor=executor, piece=10, **FIXED)
     assert np.array_equal(found["final_error"], expected["final_error"])
+
+
+def loky_executor():
+    loky = pytest.importorskip("loky")
+    return loky.get_reusable_executor(2)
+
+
+# loky's own warnings are loky's.
+@pytest.mark.filterwarnings("ignore")
+def test_loky_sends_a_metric_of_a_notebook():
+    # Such a metric is in no module that a worker can import.
+    least = 0.25
+    metric = lambda run: np.maximum(np.abs(run.positions[-1] - run.setpoint).max(axis=1), least)
+    expected = pendularm.sweep(GRID, metric, **FIXED)
+    executor = loky_executor()
+    found = pendularm.sweep(GRID, metric, executor=executor, piece=10, **FIXED)
+    executor.shutdown()
+    assert np.array_equal(found["metric"], expected["metric"])
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("kind", ["processes", "loky"])
+def test_a_sweep_whose_worker_is_lost_continues_from_its_folder(kind, tmp_path):
+    if kind == "processes" and sys.platform != "linux":
+        pytest.skip("the metric is known only to a forked process")
+    parent, mark = os.getpid(), str(tmp_path / "lost")
+
+    def losing(run):
+        if os.getpid() != parent and run.positions[0, 0, 0] == 0.0 and not os.path.exists(mark):
+            time.sleep(0.5)
+            open(mark, "x").close()
+            os._exit(1)
+        return np.abs(run.positions[-1] - run.setpoint).max(axis=1)
+
+    if kind == "processes":
+        # Sent by its name, while loky sends its code.
+        globals()["losing"] = losing
+        losing.__qualname__ = "losing"
+    ask = {"grid": GRID, "metric": losing, "folder": tmp_path / "kept", "piece": 4, **FIXED}
+    begin = lambda: loky_executor() if kind == "loky" else ProcessPoolExecutor(2, multiprocessing.get_context("fork"))
+    executor = begin()
+    with pytest.raises(BrokenExecutor):
+        pendularm.sweep(executor=executor, **ask)
+    executor.shutdown()
+    executor = begin()
+    found = pendularm.sweep(executor=executor, **ask)
+    executor.shutdown()
+    expected = pendularm.sweep(GRID, losing, **FIXED)
+    assert np.array_equal(found["metric"], expected["metric"])
 
 
 @pytest.fixture
