@@ -44,8 +44,8 @@ pub(crate) use for_either;
 /// An arm: a chain of 2 or 3 uniform rods on revolute joints, and gravity along -y. It never changes.
 ///
 /// Joint angles are relative to the previous link (the first to +x), counter-clockwise. `lengths` [m] and `masses`
-/// [kg] have one number per link, 1 by default. `gravity` [m/s²] is 9.81 by default. Raises `ValueError` for an
-/// invalid number.
+/// [kg] have one number per link, 1 by default. `gravity` [m/s²] is 9.81 by default. `viscous` [N m s/rad] is the
+/// friction of each joint, 0 by default. Raises `ValueError` for an invalid number.
 #[pyclass(frozen, eq, module = "pendularm")]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Arm {
@@ -56,19 +56,22 @@ pub(crate) struct Arm {
 impl Arm {
     #[new]
     #[pyo3(
-        signature = (links=Whole::Is(2), *, lengths=None, masses=None, gravity=Real::Is(9.81)),
-        text_signature = "(links=2, *, lengths=None, masses=None, gravity=9.81)"
+        signature = (
+            links=Whole::Is(2), *, lengths=None, masses=None, gravity=Real::Is(9.81), viscous=None
+        ),
+        text_signature = "(links=2, *, lengths=None, masses=None, gravity=9.81, viscous=None)"
     )]
     fn new(
         links: Whole,
         lengths: Option<&Object<'_>>,
         masses: Option<&Object<'_>>,
         gravity: Real,
+        viscous: Option<&Object<'_>>,
     ) -> PyResult<Self> {
         let gravity = gravity.read("gravity")?;
         let chain = match fields::links(links)? {
-            2 => Chain::Two(read(lengths, masses, gravity)?),
-            _ => Chain::Three(read(lengths, masses, gravity)?),
+            2 => Chain::Two(read(lengths, masses, gravity, viscous)?),
+            _ => Chain::Three(read(lengths, masses, gravity, viscous)?),
         };
         Ok(Self { chain })
     }
@@ -97,6 +100,12 @@ impl Arm {
         for_either!(&self.chain, arm => arm.gravity())
     }
 
+    /// Viscous friction of each joint [N m s/rad], (links,).
+    #[getter]
+    fn viscous<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray1<f64>>> {
+        for_either!(&self.chain, arm => property(py, arm.viscous()))
+    }
+
     /// Distance from the base to the end effector of the stretched arm [m].
     #[getter]
     fn reach(&self) -> f64 {
@@ -106,14 +115,14 @@ impl Arm {
 
     fn __repr__(&self) -> String {
         for_either!(&self.chain, arm => format!(
-            "Arm({}, lengths={:?}, masses={:?}, gravity={:?})",
-            self.links(), arm.lengths(), arm.masses(), arm.gravity()
+            "Arm({}, lengths={:?}, masses={:?}, gravity={:?}, viscous={:?})",
+            self.links(), arm.lengths(), arm.masses(), arm.gravity(), arm.viscous()
         ))
     }
 
     fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
         let numbers = for_either!(&self.chain, arm => {
-            [arm.lengths().as_slice(), arm.masses(), &[arm.gravity()]].concat()
+            [arm.lengths().as_slice(), arm.masses(), &[arm.gravity()], arm.viscous()].concat()
         });
         PyTuple::new(py, numbers)?.hash()
     }
@@ -123,6 +132,7 @@ impl Arm {
         given.set_item("lengths", self.lengths(py)?)?;
         given.set_item("masses", self.masses(py)?)?;
         given.set_item("gravity", self.gravity())?;
+        given.set_item("viscous", self.viscous(py)?)?;
         Ok(((self.links(),), given))
     }
 }
@@ -131,11 +141,14 @@ fn read<const N: usize>(
     lengths: Option<&Object<'_>>,
     masses: Option<&Object<'_>>,
     gravity: f64,
+    viscous: Option<&Object<'_>>,
 ) -> PyResult<Rods<N>> {
     let _floats = Promised::begin();
     let lengths = joints_or("lengths", lengths, Bound::Positive, [1.0; N])?;
     let masses = joints_or("masses", masses, Bound::Positive, [1.0; N])?;
-    Rods::new(lengths, masses, gravity).map_err(refused)
+    let viscous = joints_or("viscous", viscous, Bound::NotNegative, [0.0; N])?;
+    let arm = Rods::new(lengths, masses, gravity).and_then(|arm| arm.with_friction(viscous));
+    arm.map_err(refused)
 }
 
 /// An arm as an argument.

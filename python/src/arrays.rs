@@ -7,14 +7,14 @@ use numpy::{
     Element, IntoPyArray, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::{PyMemoryError, PyOverflowError};
+use pyo3::exceptions::{PyMemoryError, PyOverflowError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
 use crate::fields::{
     Bound, Held, MOST_LISTED, Object, Real, beyond, has_booleans, held, is_masked, is_too_long,
-    refused, shown,
+    refused, shown, wrong_type,
 };
 
 /// An empty vector with capacity for `count` entries.
@@ -82,10 +82,13 @@ impl<'py> ArrayArgument<'py> {
                 if why.is_instance_of::<PyMemoryError>(value.py()) {
                     return why;
                 }
-                refused(format_args!(
-                    "{field} must be an array of numbers, got {}",
-                    shown(value)
-                ))
+                let said = format!("{field} must be an array of numbers, got {}", shown(value));
+                // NumPy refuses rows of different lengths by a ValueError.
+                if why.is_instance_of::<PyValueError>(value.py()) {
+                    refused(said)
+                } else {
+                    wrong_type(said)
+                }
             })?,
         };
         let array = laid_out(&array)?.try_readonly().map_err(|_| {
@@ -137,6 +140,28 @@ impl<'py> ArrayArgument<'py> {
         self.checked(1, shape.is_empty(), bound)
     }
 
+    /// The numbers as a list.
+    pub(crate) fn list(&self, bound: Bound) -> PyResult<&[f64]> {
+        if self.shape().len() != 1 {
+            return Err(refused(format_args!(
+                "{} must have the shape (n,), got {}",
+                self.field,
+                in_python(self.shape())
+            )));
+        }
+        Ok(self.checked(1, false, bound)?.values)
+    }
+
+    /// The numbers as one finite row of `N`, or as some.
+    pub(crate) fn each<const N: usize>(&self) -> PyResult<Vec<[f64; N]>> {
+        let count = match self.shape() {
+            [count, _] => *count,
+            _ => 1,
+        };
+        let rows = self.rows(Some(count), N, Bound::Finite)?;
+        collected(count, (0..count).map(|row| rows.row(row)))
+    }
+
     /// The numbers as rows of this width, all within a bound.
     fn checked(&self, width: usize, is_one: bool, bound: Bound) -> PyResult<Rows<'_>> {
         let values = self.array.as_slice()?;
@@ -182,7 +207,7 @@ fn is_writeable(array: &Object<'_>) -> PyResult<bool> {
 pub(crate) fn as_doubles<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     let py = value.py();
     if has_booleans(value)? {
-        return Err(refused(shown(value)));
+        return Err(wrong_type(shown(value)));
     }
     let numpy = py.import("numpy")?;
     let array = numpy.call_method1("asarray", (value,))?;
@@ -194,7 +219,7 @@ pub(crate) fn as_doubles<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArray
             if let Real::Other(one) = one
                 && !one.is_beyond
             {
-                return Err(refused(one));
+                return Err(wrong_type(one));
             }
         }
         numpy.call_method1("asarray", (array, "float64"))?

@@ -132,8 +132,11 @@ of_rows! {
     /// Gravity load G(q) [N m], the effort that holds the arm still at `q` [rad], of shape (links,) or (n, links).
     gravity_load(arm, q) -> Joints, out => out.extend(dynamics::gravity_load(arm, &q));
     /// The effort [N m] that gives the accelerations `qdd` [rad/s²] at `q` [rad] and `qd` [rad/s], each of shape
-    /// (links,) or (n, links).
-    inverse_dynamics(arm, q, qd, qdd) -> Joints, out => out.extend(dynamics::inverse_dynamics(arm, &q, &qd, &qdd));
+    /// (links,) or (n, links). Friction counts.
+    inverse_dynamics(arm, q, qd, qdd) -> Joints, out => {
+        let effort = dynamics::inverse_dynamics(arm, &q, &qd, &qdd);
+        out.extend(with_friction(arm, &qd.map(|rate| -rate), effort));
+    };
     /// Kinetic energy [J] at `q` [rad] and `qd` [rad/s], of shape (links,) or (n, links): a number, or (n,).
     kinetic_energy(arm, q, qd) -> One, out => out.push(dynamics::kinetic_energy(arm, &q, &qd));
     /// Potential energy [J] at `q` [rad], of shape (links,) or (n, links), zero with the arm along the x axis: a
@@ -143,8 +146,21 @@ of_rows! {
     end_effector(arm, q) -> Point, out => out.extend(kinematics::forward(arm.lengths(), &q).position.to_array());
 }
 
+/// The effort [N m] less the friction at these rates [rad/s]. Without friction it is the same, bit for bit.
+fn with_friction<const N: usize>(
+    arm: &math::arm::Arm<N>,
+    rates: &[f64; N],
+    effort: [f64; N],
+) -> [f64; N] {
+    if arm.has_friction() {
+        dynamics::less_friction(arm.viscous(), rates, &effort)
+    } else {
+        effort
+    }
+}
+
 /// Joint accelerations [rad/s²] under `effort` [N m] at `q` [rad] and `qd` [rad/s], each of shape (links,) or (n,
-/// links).
+/// links). Friction counts.
 #[pyfunction]
 pub(crate) fn forward_dynamics<'py>(
     py: Python<'py>,
@@ -178,6 +194,15 @@ fn forward_dynamics_of_rows<const N: usize>(
                 for (column, value) in columns.iter_mut().zip(row) {
                     column[at] = value;
                 }
+            }
+        }
+        let [_, rates, efforts] = &mut given;
+        for at in 0..block.len() {
+            let [rate, effort] =
+                [&*rates, &*efforts].map(|columns| columns.map(|column| column[at]));
+            let net = with_friction(arm, &rate, effort);
+            for (column, value) in efforts.iter_mut().zip(net) {
+                column[at] = value;
             }
         }
         let [q, qd, effort] = given

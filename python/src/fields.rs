@@ -1,19 +1,20 @@
 //! Readers of arguments from Python, with the field names of the runtime's services.
 //!
-//! **Invariant:** a refused value raises a `ValueError` with its field, the valid values and the given value.
+//! **Invariant:** a refused value raises an error with its field, the valid values and the given value: a `TypeError` if
+//! its type is wrong, otherwise a `ValueError`.
 
 use std::convert::Infallible;
+use std::ffi::CString;
 use std::fmt::{self, Display, Formatter};
 use std::ops::RangeInclusive;
 
 use numpy::PyUntypedArray;
-use pendularm::math::integrator::{Method, UnknownMethod};
-use pendularm::math::simulation::ControlPeriod;
-use pyo3::Borrowed;
-use pyo3::exceptions::{PyOverflowError, PyValueError};
+use pendularm::math::integrator::Method;
+use pyo3::exceptions::{PyDeprecationWarning, PyOverflowError, PyTypeError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyErr, PyResult, pyfunction};
 use pyo3::types::{PyBool, PyFloat, PyInt, PyList, PyStringMethods, PyTuple};
+use pyo3::{Borrowed, PyTypeInfo};
 
 /// Most dimensions of an array, and so the largest depth of nested lists.
 const MOST_DIMENSIONS: usize = 2;
@@ -27,6 +28,8 @@ pub(crate) enum Bound {
     Finite,
     Positive,
     NotNegative,
+    /// Not negative. Infinity means no limit.
+    Limit,
 }
 
 impl Bound {
@@ -35,23 +38,29 @@ impl Bound {
             Self::Finite => "finite",
             Self::Positive => "finite and greater than 0",
             Self::NotNegative => "finite and at least 0",
+            Self::Limit => "at least 0, or inf for no limit",
         }
     }
 
     /// Whether the number is valid.
     pub(crate) fn admits(self, value: f64) -> bool {
-        value.is_finite()
-            && match self {
-                Self::Finite => true,
-                Self::Positive => value > 0.0,
-                Self::NotNegative => value >= 0.0,
-            }
+        match self {
+            Self::Finite => value.is_finite(),
+            Self::Positive => value.is_finite() && value > 0.0,
+            Self::NotNegative => value.is_finite() && value >= 0.0,
+            Self::Limit => value >= 0.0,
+        }
     }
 }
 
-/// A refusal.
+/// The refusal of a value.
 pub(crate) fn refused(why: impl Display) -> PyErr {
     PyValueError::new_err(why.to_string())
+}
+
+/// The refusal of a value of a wrong type.
+pub(crate) fn wrong_type(why: impl Display) -> PyErr {
+    PyTypeError::new_err(why.to_string())
 }
 
 /// A Python object, with the proof that the interpreter's lock is held.
@@ -248,9 +257,14 @@ pub(crate) trait LosslessArgument {
         true
     }
 
-    /// The refusal of a value that does not have this type.
+    /// The refusal of a value that does not have this type, or is too large for it.
     fn refusal(field: &str, value: &Other) -> PyErr {
-        refused(format_args!("{field} {}, got {value}", Self::rule()))
+        let why = format_args!("{field} {}, got {value}", Self::rule()).to_string();
+        if value.is_beyond {
+            refused(why)
+        } else {
+            wrong_type(why)
+        }
     }
 }
 
@@ -304,7 +318,7 @@ impl LosslessArgument for f64 {
         if value.is_beyond {
             return beyond(field);
         }
-        refused(format_args!("{field} {}, got {value}", Self::rule()))
+        wrong_type(format_args!("{field} {}, got {value}", Self::rule()))
     }
 }
 
@@ -327,14 +341,35 @@ impl LosslessArgument for bool {
 
 impl LosslessArgument for String {
     fn rule() -> String {
-        UnknownMethod.to_string()
+        "must be a text".to_owned()
     }
 }
 
 impl Name {
     /// The method of this name.
     pub(crate) fn method(self, field: &str) -> PyResult<Method> {
-        method(field, &self.read(field)?)
+        self.choice(field, &Method::ALL, Method::name)
+    }
+
+    /// One of `all`, by its name.
+    pub(crate) fn choice<T: Copy>(
+        self,
+        field: &str,
+        all: &[T],
+        name: impl Fn(T) -> &'static str,
+    ) -> PyResult<T> {
+        let rule = || {
+            let names: Vec<_> = all.iter().map(|&one| name(one)).collect();
+            format!("{field} must be one of {}", names.join(", "))
+        };
+        match self {
+            Self::Is(given) => {
+                let found = all.iter().find(|&&one| name(one) == given);
+                let refusal = || refused(format_args!("{}, got {given:?}", rule()));
+                found.copied().ok_or_else(refusal)
+            }
+            Self::Other(given) => Err(wrong_type(format_args!("{}, got {given}", rule()))),
+        }
     }
 }
 
@@ -348,16 +383,54 @@ impl Whole {
     }
 
     /// The number in a range. `rule` is the start of the refusal of another value.
-    fn within(self, range: RangeInclusive<usize>, rule: impl Display) -> PyResult<usize> {
-        let refusal = |value: &dyn Display| refused(format_args!("{rule}, got {value}"));
+    pub(crate) fn within(
+        self,
+        range: RangeInclusive<usize>,
+        rule: impl Display,
+    ) -> PyResult<usize> {
         match self {
             Self::Is(value) => usize::try_from(value)
                 .ok()
                 .filter(|value| range.contains(value))
-                .ok_or_else(|| refusal(&value)),
-            Self::Other(value) => Err(refusal(&value)),
+                .ok_or_else(|| refused(format_args!("{rule}, got {value}"))),
+            Self::Other(value) if value.is_beyond => {
+                Err(refused(format_args!("{rule}, got {value}")))
+            }
+            Self::Other(value) => Err(wrong_type(format_args!("{rule}, got {value}"))),
         }
     }
+}
+
+/// An argument under its name, or under an `older` one, with a `DeprecationWarning`.
+pub(crate) fn renamed<'py>(
+    name: &str,
+    given: Option<&Object<'py>>,
+    older: &str,
+    value: Option<&Object<'py>>,
+) -> PyResult<Option<Object<'py>>> {
+    let Some(value) = value else {
+        return Ok(given.cloned());
+    };
+    if given.is_some() {
+        return Err(wrong_type(format_args!(
+            "{older} is an older name of {name}: pass one of them"
+        )));
+    }
+    let py = value.py();
+    let text = CString::new(format!("{older} is an older name of {name}"))?;
+    PyErr::warn(py, &PyDeprecationWarning::type_object(py), &text, 1)?;
+    Ok(Some(value.clone()))
+}
+
+/// As [`renamed`], for an argument that must be given.
+pub(crate) fn required<'py>(
+    name: &str,
+    given: Option<&Object<'py>>,
+    older: &str,
+    value: Option<&Object<'py>>,
+) -> PyResult<Object<'py>> {
+    let missing = || wrong_type(format_args!("missing the required argument {name}"));
+    renamed(name, given, older, value)?.ok_or_else(missing)
 }
 
 /// A count, if this is one. It must not be masked.
@@ -379,18 +452,4 @@ pub(crate) fn number(field: &str, value: Real, bound: Bound) -> PyResult<f64> {
 /// 2 or 3.
 pub(crate) fn links(value: Whole) -> PyResult<usize> {
     value.within(2..=3, "links must be 2 or 3")
-}
-
-/// A method by its name.
-pub(crate) fn method(field: &str, name: &str) -> PyResult<Method> {
-    name.parse()
-        .map_err(|why| refused(format_args!("{field} {why}, got {name:?}")))
-}
-
-/// The control period, without a delay.
-pub(crate) fn read_period(period: Real) -> PyResult<ControlPeriod> {
-    Ok(ControlPeriod {
-        period: number("control_period", period, Bound::NotNegative)?,
-        delay: 0,
-    })
 }

@@ -9,7 +9,7 @@ use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::{PyDict, PyMapping};
 
 use crate::arrays::joints;
-use crate::fields::{self, Bound, Held, Object, Whole, refused, shown};
+use crate::fields::{self, Bound, Held, Object, Whole, refused, shown, wrong_type};
 
 /// The gains of a fresh runtime: `kp` [N m/rad], `ki` [N m/(rad s)] and `kd` [N m s/rad], (links,) each.
 #[pyfunction]
@@ -55,7 +55,7 @@ pub(crate) fn read<const N: usize>(
         Some(gains)
     };
     let gains = of_mapping().or_else(of_attributes).ok_or_else(|| {
-        refused(format_args!(
+        wrong_type(format_args!(
             "gains must be a mapping with kp, ki and kd, got {}",
             shown(value)
         ))

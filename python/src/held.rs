@@ -75,14 +75,20 @@ fn listed<'py>(py: Python<'py>, limit: &HeldLimit) -> PyResult<Held<'py, PyDict>
     });
     let at = limit.at.as_ref();
     let found = PyDict::new(py);
-    found.set_item("period_limit", limit.period_limit)?;
+    let unknown = f64::NAN;
+    let no_limit = f64::INFINITY;
+    found.set_item("period_limit", limit.period_limit.unwrap_or(no_limit))?;
     found.set_item("critical", critical.transpose()?)?;
     found.set_item("effective_inertia", limit.effective_inertia.to_pyarray(py))?;
     found.set_item("stable", at.map(|at| at.is_stable))?;
-    found.set_item("growth_per_period", at.map(|at| at.growth_per_period))?;
-    found.set_item("timestep_limit", at.and_then(|at| at.timestep_limit))?;
-    found.set_item("kd_factor_limit", at.and_then(|at| at.kd_factor))?;
-    found.set_item("armature", at.and_then(|at| at.armature))?;
+    let growth = at.map_or(unknown, |at| at.growth_per_period);
+    found.set_item("growth_per_period", growth)?;
+    let timestep = at.map_or(unknown, |at| at.timestep_limit.unwrap_or(no_limit));
+    found.set_item("timestep_limit", timestep)?;
+    let factor = at.and_then(|at| at.kd_factor);
+    found.set_item("kd_factor_limit", factor.unwrap_or(unknown))?;
+    let armature = at.and_then(|at| at.armature);
+    found.set_item("armature", armature.unwrap_or(unknown))?;
     found.set_item("explanation", &limit.explanation)?;
     Ok(found)
 }

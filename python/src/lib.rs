@@ -16,6 +16,7 @@ mod gains;
 mod held;
 mod method;
 mod patience;
+mod robot;
 mod simulation;
 mod state;
 mod study;
@@ -50,5 +51,5 @@ mod native {
     #[pymodule_export]
     use crate::simulation::{Divergence, Simulation};
     #[pymodule_export]
-    use crate::study::{plan, rollout, stability, suggest_gains};
+    use crate::study::{linearize, plan, rollout, stability, suggest_gains};
 }

@@ -5,6 +5,7 @@
 use numpy::ToPyArray;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::ControlPeriod;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::method::{self, Analysis, Given, NAMES, Swing, Typed};
 use pendularm::study::paused::Paused;
@@ -14,7 +15,7 @@ use pyo3::types::PyDict;
 
 use crate::arm::{self, for_either, or_default};
 use crate::arrays::{joints_or, room};
-use crate::fields::{Bound, Held, Object, Real, read_period, refused};
+use crate::fields::{self, Bound, Held, Object, Real, refused};
 use crate::floats::Promised;
 use crate::gains;
 use crate::patience::until_done;
@@ -122,7 +123,14 @@ pub(crate) fn analyse_method<'py>(
 ) -> PyResult<Held<'py, PyDict>> {
     let _floats = Promised::begin();
     let given = arguments.tableau.read()?;
-    let period = read_period(arguments.control_period)?;
+    let period = ControlPeriod {
+        period: fields::number(
+            "control_period",
+            arguments.control_period,
+            Bound::NotNegative,
+        )?,
+        delay: 0,
+    };
     for_either!(or_default(arguments.arm)?, arm => {
         let gains = gains::read(arguments.gains.as_ref(), Gains::default())?;
         let setpoint = joints_or("setpoint", arguments.setpoint.as_ref(), Bound::Finite, [0.0; _])?;

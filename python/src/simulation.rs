@@ -9,7 +9,9 @@ use pendularm::math::arm::{Arm as Rods, State};
 use pendularm::math::dynamics::energy;
 use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::forward;
+use pendularm::math::limits::Limits;
 use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::sensors::Sensors;
 use pendularm::math::simulation::{ControlPeriod, Simulation as Loop};
 use pyo3::IntoPyObject;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyclass, pymethods};
@@ -17,9 +19,12 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::arm::{Arm, Chain, Either, Given, for_either, or_default};
 use crate::arrays::{joints, joints_or, property};
-use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
+use crate::fields::{
+    self, Bound, Flag, Held, Name, Object, Real, Whole, refused, renamed, required,
+};
 use crate::gains;
 use crate::patience::{hold, until_done};
+use crate::robot::{self, Robot};
 use crate::state;
 
 /// Steps between two checks of the clock: some hundred microseconds.
@@ -65,9 +70,16 @@ impl Divergence {
 /// It starts as in a fresh runtime: stretched along +x, at rest, with the controller off. `method` is `euler`,
 /// `midpoint`, `verlet` or `rk4`. `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,)
 /// each. A missing gain has the value of a fresh runtime. The controller runs once per `control_period` [s],
-/// rounded to a whole number of timesteps, at least 1. Its effort is held in between. With `control_delay` it is
-/// applied one period later. Threads may share a simulation. A copied or unpickled one takes the same steps, bit for
-/// bit. A process that is forked while another thread steps it must not use it.
+/// rounded to a whole number of timesteps, at least 1. Its effort is held in between, and is applied `control_delay`
+/// periods later, up to 16.
+///
+/// The motors apply at most `effort_limit` [N m], (links,): `inf` is no limit, the default, and 0 a joint without a
+/// motor. `anti_windup` is what the integral does at a limit: `clamp`, `none`, `conditional`, or `back_calculation` with
+/// `tracking_time` [s]. The controller measures positions in steps of `encoder_step` [rad], (links,), 0 for exact ones.
+/// Its `velocity_source` is `exact`, or the `difference` of two measured positions.
+///
+/// Threads may share a simulation. A copied or unpickled one takes the same steps, bit for bit. A process that is forked
+/// while another thread steps it must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Simulation {
@@ -80,14 +92,22 @@ fn begin<const N: usize>(
     arm: Rods<N>,
     method: Method,
     timestep: f64,
-    period: ControlPeriod,
     gains: Option<&Object<'_>>,
+    robot: Robot<'_>,
 ) -> PyResult<Mutex<Loop<N>>> {
+    let (limits, sensors, period) = robot.read()?;
     let mut one = Loop::new(arm, gains::read(gains, Gains::default())?);
     one.set_method(method);
     one.set_timestep(timestep);
     one.set_control_period(period);
+    one.set_limits(limits);
+    one.set_sensors(sensors);
     Ok(Mutex::new(one))
+}
+
+/// The default of an argument that is a name.
+fn name(name: &str) -> Name {
+    Name::Is(name.to_owned())
 }
 
 #[pymethods]
@@ -95,36 +115,50 @@ impl Simulation {
     #[new]
     #[pyo3(
         signature = (
-            arm=None, *, method=Name::Is("rk4".to_owned()), timestep=Real::Is(0.001), gains=None,
-            control_period=Real::Is(0.0), control_delay=Flag::Is(false)
+            arm=None, *, method=name("rk4"), timestep=Real::Is(0.001), gains=None,
+            control_period=Real::Is(0.0), control_delay=None, effort_limit=None,
+            anti_windup=name("clamp"), tracking_time=Real::Is(0.2), encoder_step=None,
+            velocity_source=name("exact")
         ),
         text_signature = "(arm=None, *, method=\"rk4\", timestep=0.001, gains=None, control_period=0.0, \
-                          control_delay=False)"
+                          control_delay=0, effort_limit=None, anti_windup=\"clamp\", tracking_time=0.2, \
+                          encoder_step=None, velocity_source=\"exact\")"
     )]
-    fn new(
-        arm: Option<Given<'_>>,
+    #[expect(clippy::too_many_arguments, reason = "they are keywords")]
+    fn new<'py>(
+        arm: Option<Given<'py>>,
         method: Name,
         timestep: Real,
-        gains: Option<&Object<'_>>,
+        gains: Option<&Object<'py>>,
         control_period: Real,
-        control_delay: Flag,
+        control_delay: Option<Object<'py>>,
+        effort_limit: Option<Object<'py>>,
+        anti_windup: Name,
+        tracking_time: Real,
+        encoder_step: Option<Object<'py>>,
+        velocity_source: Name,
     ) -> PyResult<Self> {
         let method = method.method("method")?;
         let timestep = fields::number("timestep", timestep, Bound::Positive)?;
-        let period = ControlPeriod {
-            period: fields::number("control_period", control_period, Bound::NotNegative)?,
-            delay: control_delay.read("control_delay")?.into(),
+        let robot = Robot {
+            effort_limit,
+            anti_windup,
+            tracking_time,
+            encoder_step,
+            velocity_source,
+            control_period,
+            control_delay,
         };
         let own = match or_default(arm)? {
-            Chain::Two(arm) => Either::Two(begin(arm, method, timestep, period, gains)?),
-            Chain::Three(arm) => Either::Three(begin(arm, method, timestep, period, gains)?),
+            Chain::Two(arm) => Either::Two(begin(arm, method, timestep, gains, robot)?),
+            Chain::Three(arm) => Either::Three(begin(arm, method, timestep, gains, robot)?),
         };
         Ok(Self { own })
     }
 
     /// Takes up to `steps` steps and returns their number: all, unless the simulation diverges. The interpreter's lock
     /// is released meanwhile, and Ctrl-C ends the call between two steps. With an `effort` [N m], (links,), that effort
-    /// is applied in these steps, and the controller does not run.
+    /// is applied in these steps, within the limits of the motors, and the controller does not run.
     #[pyo3(signature = (steps=Whole::Is(1), effort=None), text_signature = "($self, steps=1, effort=None)")]
     fn step(&self, py: Python<'_>, steps: Whole, effort: Option<&Object<'_>>) -> PyResult<u64> {
         let steps = steps.read("steps")?;
@@ -149,18 +183,25 @@ impl Simulation {
         Ok(())
     }
 
-    /// Sets the setpoint: `positions` [rad] and `velocities` [rad/s] (zeros by default), (links,) each.
-    #[pyo3(signature = (positions, velocities=None))]
+    /// Sets the setpoint: positions `q` [rad] and rates `qd` [rad/s] (zeros by default), (links,) each.
+    #[pyo3(
+        signature = (q=None, qd=None, *, positions=None, velocities=None),
+        text_signature = "($self, q, qd=None)"
+    )]
     fn set_setpoint(
         &self,
         py: Python<'_>,
-        positions: &Object<'_>,
+        q: Option<&Object<'_>>,
+        qd: Option<&Object<'_>>,
+        positions: Option<&Object<'_>>,
         velocities: Option<&Object<'_>>,
     ) -> PyResult<()> {
+        let q = required("q", q, "positions", positions)?;
+        let qd = renamed("qd", qd, "velocities", velocities)?;
         for_either!(&self.own, one => {
             let setpoint = Setpoint {
-                position: joints("positions", positions, Bound::Finite)?,
-                velocity: joints_or("velocities", velocities, Bound::Finite, [0.0; _])?,
+                position: joints("q", &q, Bound::Finite)?,
+                velocity: joints_or("qd", qd.as_ref(), Bound::Finite, [0.0; _])?,
             };
             hold(py, one).set_setpoint(setpoint);
         });
@@ -189,19 +230,26 @@ impl Simulation {
         Ok(())
     }
 
-    /// Sets the state: `position` [rad] and `velocity` [rad/s] (zeros by default), (links,) each. A divergence ends.
-    /// Clock and controller do not change. With the bytes of `get_state` in place of the position, everything is set:
+    /// Sets the state: positions `q` [rad] and rates `qd` [rad/s] (zeros by default), (links,) each. A divergence ends.
+    /// Clock and controller do not change. With the bytes of `get_state` in place of `q`, everything is set:
     /// arm, controller, method, clock, disturbance and divergence.
-    #[pyo3(signature = (position, velocity=None))]
+    #[pyo3(
+        signature = (q=None, qd=None, *, position=None, velocity=None),
+        text_signature = "($self, q, qd=None)"
+    )]
     fn set_state(
         &self,
         py: Python<'_>,
-        position: &Object<'_>,
+        q: Option<&Object<'_>>,
+        qd: Option<&Object<'_>>,
+        position: Option<&Object<'_>>,
         velocity: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        if let Ok(state) = position.cast::<PyBytes>() {
+        let q = required("q", q, "position", position)?;
+        let qd = renamed("qd", qd, "velocity", velocity)?;
+        if let Ok(state) = q.cast::<PyBytes>() {
             for_either!(&self.own, one => {
-                if let Some(read) = state::read(state, 1, velocity)?.pop() {
+                if let Some(read) = state::read(state, 1, qd.as_ref())?.pop() {
                     *hold(py, one) = read;
                 }
             });
@@ -209,8 +257,8 @@ impl Simulation {
         }
         for_either!(&self.own, one => {
             let state = State {
-                position: joints("position", position, Bound::Finite)?,
-                velocity: joints_or("velocity", velocity, Bound::Finite, [0.0; _])?,
+                position: joints("q", &q, Bound::Finite)?,
+                velocity: joints_or("qd", qd.as_ref(), Bound::Finite, [0.0; _])?,
             };
             hold(py, one).set_state(state);
         });
@@ -231,7 +279,7 @@ impl Simulation {
     }
 
     fn __setstate__(&self, py: Python<'_>, state: &Object<'_>) -> PyResult<()> {
-        self.set_state(py, state, None)
+        self.set_state(py, Some(state), None, None, None)
     }
 
     /// Adds `effort` [N m], (links,), to the controller's in every step that begins within `duration` [s] from now. It
@@ -272,19 +320,28 @@ impl Simulation {
         self.own.links()
     }
 
-    /// Joint positions [rad], (links,), never wrapped.
+    /// Joint positions q [rad], (links,), never wrapped.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
         for_either!(&self.own, one => property(py, &hold(py, one).state().position))
     }
 
-    /// Joint rates [rad/s], (links,).
+    /// Joint rates qd [rad/s], (links,).
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
         for_either!(&self.own, one => property(py, &hold(py, one).state().velocity))
     }
 
-    /// Effort of the latest step [N m], (links,): the controller's plus the disturbance's.
+    /// Positions [rad] and rates [rad/s] as the controller measured them in its latest run, (links,) each.
+    #[getter]
+    fn measured<'py>(&self, py: Python<'py>) -> PyResult<(ArrayProperty<'py>, ArrayProperty<'py>)> {
+        for_either!(&self.own, one => {
+            let State { position, velocity } = hold(py, one).measured();
+            Ok((property(py, &position)?, property(py, &velocity)?))
+        })
+    }
+
+    /// Effort of the latest step [N m], (links,): that of the motors plus the disturbance's.
     #[getter]
     fn effort<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
         for_either!(&self.own, one => property(py, hold(py, one).effort()))
@@ -381,19 +438,106 @@ impl Simulation {
         })
     }
 
-    /// Whether the controller's effort is applied one control period after its state was read.
+    /// The number of control periods after which the controller's effort is applied, 0 to 16.
     #[getter]
-    fn control_delay(&self, py: Python<'_>) -> bool {
-        for_either!(&self.own, one => hold(py, one).control_period()).delay > 0
+    fn control_delay(&self, py: Python<'_>) -> u8 {
+        for_either!(&self.own, one => hold(py, one).control_period()).delay
     }
 
     #[setter]
-    fn set_control_delay(&self, py: Python<'_>, control_delay: Flag) -> PyResult<()> {
-        let delay = control_delay.read("control_delay")?.into();
+    fn set_control_delay(&self, py: Python<'_>, control_delay: &Object<'_>) -> PyResult<()> {
+        let delay = robot::delay(control_delay)?;
         for_either!(&self.own, one => {
             let mut one = hold(py, one);
             let present = one.control_period();
             one.set_control_period(ControlPeriod { delay, ..present });
+        });
+        Ok(())
+    }
+
+    /// The largest effort that each motor applies [N m], (links,); `inf` for no limit, 0 for no motor.
+    #[getter]
+    fn effort_limit<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
+        for_either!(&self.own, one => {
+            property(py, &hold(py, one).limits().effort.unwrap_or([f64::INFINITY; _]))
+        })
+    }
+
+    #[setter]
+    fn set_effort_limit(&self, py: Python<'_>, effort_limit: &Object<'_>) -> PyResult<()> {
+        for_either!(&self.own, one => {
+            let effort = robot::limited(joints("effort_limit", effort_limit, Bound::Limit)?);
+            let mut one = hold(py, one);
+            let limits = *one.limits();
+            one.set_limits(Limits { effort, ..limits });
+        });
+        Ok(())
+    }
+
+    /// What the integral does while an effort is at its limit: `clamp`, `none`, `conditional` or `back_calculation`.
+    #[getter]
+    fn anti_windup(&self, py: Python<'_>) -> &'static str {
+        for_either!(&self.own, one => hold(py, one).limits().anti_windup.name())
+    }
+
+    #[setter]
+    fn set_anti_windup(&self, py: Python<'_>, anti_windup: Name) -> PyResult<()> {
+        let anti_windup = robot::anti_windup(anti_windup)?;
+        for_either!(&self.own, one => {
+            let mut one = hold(py, one);
+            let limits = *one.limits();
+            one.set_limits(Limits { anti_windup, ..limits });
+        });
+        Ok(())
+    }
+
+    /// The time in which `back_calculation` removes an excess of effort [s].
+    #[getter]
+    fn tracking_time(&self, py: Python<'_>) -> f64 {
+        for_either!(&self.own, one => hold(py, one).limits().tracking_time)
+    }
+
+    #[setter]
+    fn set_tracking_time(&self, py: Python<'_>, tracking_time: Real) -> PyResult<()> {
+        let tracking_time = robot::tracking_time(tracking_time)?;
+        for_either!(&self.own, one => {
+            let mut one = hold(py, one);
+            let limits = *one.limits();
+            one.set_limits(Limits { tracking_time, ..limits });
+        });
+        Ok(())
+    }
+
+    /// The step of each joint's encoder [rad], (links,); 0 for an exact position.
+    #[getter]
+    fn encoder_step<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
+        for_either!(&self.own, one => property(py, &hold(py, one).sensors().encoder_step))
+    }
+
+    #[setter]
+    fn set_encoder_step(&self, py: Python<'_>, encoder_step: &Object<'_>) -> PyResult<()> {
+        for_either!(&self.own, one => {
+            let encoder_step = joints("encoder_step", encoder_step, Bound::NotNegative)?;
+            let mut one = hold(py, one);
+            let sensors = *one.sensors();
+            one.set_sensors(Sensors { encoder_step, ..sensors });
+        });
+        Ok(())
+    }
+
+    /// How the controller measures velocities: `exact`, or the `difference` of positions over a control period.
+    #[getter]
+    fn velocity_source(&self, py: Python<'_>) -> &'static str {
+        for_either!(&self.own, one => hold(py, one).sensors().velocity.name())
+    }
+
+    #[setter]
+    fn set_velocity_source(&self, py: Python<'_>, velocity_source: Name) -> PyResult<()> {
+        let velocity = robot::velocity_source(velocity_source)?;
+        for_either!(&self.own, one => {
+            let mut one = hold(py, one);
+            let sensors = *one.sensors();
+            one.set_sensors(Sensors { velocity, ..sensors });
         });
         Ok(())
     }

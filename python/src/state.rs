@@ -4,9 +4,9 @@
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
-use pendularm::math::limits::Limits;
+use pendularm::math::limits::{AntiWindup, Limits};
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::sensors::Sensors;
+use pendularm::math::sensors::{MAX_DELAY, Sensors, VelocitySource};
 use pendularm::math::simulation::{Checkpoint, ControlPeriod, Held, Memory, Simulation};
 use pyo3::prelude::{PyErr, PyResult, Python};
 use pyo3::types::{PyBytes, PyBytesMethods};
@@ -16,14 +16,14 @@ use crate::fields::{self, Bound, Object, refused};
 use crate::floats::Promised;
 
 /// The start of a state. Its last character is the version of this form.
-const HEAD: &[u8] = b"pendularm state 1";
+const HEAD: &[u8] = b"pendularm state 2";
 
 /// Most steps of a state, years of simulation. One more step fits into a `u64`.
 const MOST_STEPS: u64 = 1 << 62;
 
 /// Bytes of the checkpoint of an arm of `links` links.
 const fn length(links: usize) -> usize {
-    8 * (18 * links + 16)
+    8 * (38 * links + 21)
 }
 
 /// The state of some simulations.
@@ -55,18 +55,21 @@ fn words<const N: usize>(one: &Checkpoint<N>) -> impl Iterator<Item = u64> + use
         Some((step, time)) => (1, step, time),
         None => (0, 0, 0.0),
     };
-    let method = Method::ALL.iter().position(|&method| method == one.method);
     let wholes = [
         u64::from(one.enabled),
         u64::from(one.held.period.delay),
         one.held.due,
         u64::from(one.held.driven.is_some()),
-        u64::try_from(method.unwrap_or(0)).unwrap_or(0),
+        place(&Method::ALL, one.method),
         one.steps_since_base,
         one.steps,
         pushed,
         diverged,
         step,
+        place(&AntiWindup::ALL, one.limits.anti_windup),
+        place(&VelocitySource::ALL, one.sensors.velocity),
+        u64::from(one.limits.effort.is_some()),
+        u64::from(one.memory.measured.is_some()),
     ];
     let numbers = [
         one.arm.gravity(),
@@ -75,7 +78,9 @@ fn words<const N: usize>(one: &Checkpoint<N>) -> impl Iterator<Item = u64> + use
         one.base,
         ends,
         time,
+        one.limits.tracking_time,
     ];
+    let measured = one.memory.measured.unwrap_or(State::rest());
     let joints = [
         *one.arm.lengths(),
         *one.arm.masses(),
@@ -95,9 +100,21 @@ fn words<const N: usize>(one: &Checkpoint<N>) -> impl Iterator<Item = u64> + use
         one.carry.velocity,
         one.effort,
         push,
+        *one.arm.viscous(),
+        one.limits.effort.unwrap_or([0.0; N]),
+        one.sensors.encoder_step,
+        measured.position,
+        measured.velocity,
     ];
-    let numbers = numbers.into_iter().chain(joints.into_iter().flatten());
+    let joints = joints.into_iter().chain(one.memory.waiting);
+    let numbers = numbers.into_iter().chain(joints.flatten());
     wholes.into_iter().chain(numbers.map(f64::to_bits))
+}
+
+/// The index of a choice.
+fn place<T: PartialEq>(all: &[T], one: T) -> u64 {
+    let found = all.iter().position(|each| *each == one);
+    u64::try_from(found.unwrap_or(0)).unwrap_or(0)
 }
 
 /// The simulations of a state, as many as `count`.
@@ -117,7 +134,7 @@ pub(crate) fn read<const N: usize>(
     }
     let wrong = || -> PyErr {
         refused(format_args!(
-            "position must be an array of numbers, or a state of get_state of {count} arms of {N} links"
+            "q must be an array of numbers, or a state of get_state of {count} arms of {N} links"
         ))
     };
     let _floats = Promised::begin();
@@ -160,15 +177,33 @@ impl Reader<'_> {
         Some(joints)
     }
 
+    fn state<const N: usize>(&mut self) -> Option<State<N>> {
+        Some(State {
+            position: self.joints(Bound::Finite)?,
+            velocity: self.joints(Bound::Finite)?,
+        })
+    }
+
+    /// A choice by its index.
+    fn choice<T: Copy>(&mut self, all: &[T]) -> Option<T> {
+        all.get(usize::try_from(self.whole()?).ok()?).copied()
+    }
+
     fn checkpoint<const N: usize>(mut self) -> Option<Simulation<N>> {
         let enabled = self.flag()?;
-        let delay = self.flag()?.into();
+        let delay = u8::try_from(self.whole()?).ok();
+        let delay = delay.filter(|delay| *delay <= MAX_DELAY)?;
         let due = self.whole()?;
         let is_driven = self.flag()?;
-        let method = *Method::ALL.get(usize::try_from(self.whole()?).ok()?)?;
+        let method = self.choice(&Method::ALL)?;
         let (steps_since_base, steps) = (self.whole()?, self.whole()?);
         let (is_pushed, has_diverged) = (self.flag()?, self.flag()?);
         let step = self.whole()?;
+        let (anti_windup, velocity) = (
+            self.choice(&AntiWindup::ALL)?,
+            self.choice(&VelocitySource::ALL)?,
+        );
+        let (is_limited, has_measured) = (self.flag()?, self.flag()?);
         let gravity = self.number(Bound::NotNegative)?;
         let period = self.number(Bound::NotNegative)?;
         let timestep = self.number(Bound::Positive)?;
@@ -177,6 +212,7 @@ impl Reader<'_> {
             f64::from_bits(self.whole()?),
             self.number(Bound::NotNegative)?,
         );
+        let tracking_time = self.number(Bound::Positive)?;
         let (lengths, masses) = (self.joints(Bound::Positive)?, self.joints(Bound::Positive)?);
         let mut gain = || self.joints(Bound::NotNegative);
         let gains = Gains {
@@ -200,29 +236,43 @@ impl Reader<'_> {
             command,
             driven: is_driven.then_some(driven),
         };
+        let (state, carry) = (self.state()?, self.state()?);
+        let (effort_of_step, push) = (self.joints(Bound::Finite)?, self.joints(Bound::Finite)?);
+        let viscous = self.joints(Bound::NotNegative)?;
+        let limit = self.joints(Bound::Limit)?;
+        let encoder_step = self.joints(Bound::NotNegative)?;
+        let measured = self.state()?;
+        let mut memory = Memory {
+            measured: has_measured.then_some(measured),
+            ..Memory::default()
+        };
+        for waiting in &mut memory.waiting {
+            *waiting = self.joints(Bound::Finite)?;
+        }
+        let arm = Arm::new(lengths, masses, gravity).ok()?;
         let checkpoint = Checkpoint {
-            arm: Arm::new(lengths, masses, gravity).ok()?,
+            arm: arm.with_friction(viscous).ok()?,
             gains,
             setpoint,
             integral,
             enabled,
             held,
-            // The library sets no limits, friction or sensors.
-            limits: Limits::default(),
-            sensors: Sensors::default(),
-            memory: Memory::default(),
+            limits: Limits {
+                effort: is_limited.then_some(limit),
+                anti_windup,
+                tracking_time,
+            },
+            sensors: Sensors {
+                encoder_step,
+                velocity,
+            },
+            memory,
             method,
             timestep,
-            state: State {
-                position: joints()?,
-                velocity: joints()?,
-            },
-            carry: State {
-                position: joints()?,
-                velocity: joints()?,
-            },
-            effort: joints()?,
-            disturbance: Some((joints()?, ends)).filter(|_| is_pushed && !ends.is_nan()),
+            state,
+            carry,
+            effort: effort_of_step,
+            disturbance: Some((push, ends)).filter(|_| is_pushed && !ends.is_nan()),
             base,
             steps_since_base,
             steps,

@@ -4,30 +4,65 @@
 //!
 //! **Invariant:** a result has the members of the service's answer, with the same names.
 
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use numpy::{IntoPyArray, PyArray1, PyArrayMethods, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use pendularm::math::arm::{Arm as Rods, State};
+use pendularm::math::count::{in_f64, steps_in, whole};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::study::clocks::{ClockLimits, clock_limits};
-use pendularm::study::control_loop::{ControlLoop, no_control};
+use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::gains::{GainsRequirements, search_gains};
+use pendularm::study::linear::Linear;
 use pendularm::study::motion::{FREE_SECONDS, Motion};
 use pendularm::study::paused::Paused;
 use pendularm::study::planner::{self, Planned, Task};
-use pendularm::study::rollout::{Rollout, RolloutRequest, rollout_by};
+use pendularm::study::rollout::{Course, MAX_STEPS, Rollout, RolloutRequest, rollout_along};
 use pendularm::study::stability::{Limits, search_limits};
 use pendularm::study::tableau::Pair;
-use pyo3::prelude::{FromPyObject, PyDictMethods, PyResult, Python, pyfunction};
+use pyo3::prelude::{FromPyObject, PyAnyMethods, PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
 use crate::arm::{Given, for_either, or_default};
-use crate::arrays::{joints_or, room};
-use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, read_period, refused};
+use crate::arrays::{ArrayArgument, collected, joints, joints_or, room};
+use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
 use crate::floats::Promised;
 use crate::gains;
 use crate::method::Tableau;
 use crate::patience::until_done;
+use crate::robot::Robot;
+
+// ---- linearize ------------------------------------------------------------------------------------------------------
+
+/// A square matrix and a matrix, in arrays.
+type MatrixPair<'py> = (Held<'py, PyArray2<f64>>, Held<'py, PyArray2<f64>>);
+
+/// The arm near a pose, as a linear system `d(x, v)/dt = A (x, v) + B u`, in a tuple `(A, B)` of shape (2 links, 2 links)
+/// and (2 links, links).
+///
+/// `x` [rad] is the deviation from `q` [rad], (links,), `v` [rad/s] the joint rates, and `u` [N m] the effort beyond
+/// `gravity_load(arm, q)`, which holds the arm there. Friction counts, and terms of second order do not.
+#[pyfunction]
+pub(crate) fn linearize<'py>(
+    py: Python<'py>,
+    arm: Given<'py>,
+    q: Object<'py>,
+) -> PyResult<MatrixPair<'py>> {
+    let _floats = Promised::begin();
+    for_either!(arm.chain()?, arm => {
+        let position = joints("q", &q, Bound::Finite)?;
+        let links = position.len();
+        let plant = Linear::at(&ControlLoop::free(arm), &position, &[false; _]).plant();
+        let columns = |range: Range<usize>| {
+            let width = range.len();
+            let of_row = |row| range.clone().map(move |column| (row, column));
+            let entries: Vec<_> = (0..2 * links).flat_map(of_row).map(|at| plant[at]).collect();
+            entries.into_pyarray(py).reshape([2 * links, width])
+        };
+        Ok((columns(0..2 * links)?, columns(2 * links..3 * links)?))
+    })
+}
 
 // ---- stability ------------------------------------------------------------------------------------------------------
 
@@ -36,28 +71,32 @@ use crate::patience::until_done;
 #[pyo3(from_item_all)]
 pub(crate) struct StabilityArguments<'py> {
     arm: Option<Given<'py>>,
-    integrator: Name,
+    method: Name,
     gains: Option<Object<'py>>,
     setpoint: Option<Object<'py>>,
     q: Option<Object<'py>>,
     qd: Option<Object<'py>>,
-    control_period: Real,
+    controller: Flag,
 }
 
 #[pyfunction]
 #[pyo3(signature = (arguments, /))]
 pub(crate) fn stability<'py>(
     py: Python<'py>,
-    arguments: StabilityArguments<'py>,
+    arguments: Object<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
     let _floats = Promised::begin();
-    let method = arguments.integrator.method("integrator")?;
-    let period = read_period(arguments.control_period)?;
+    let robot: Robot<'_> = arguments.extract()?;
+    let arguments: StabilityArguments<'_> = arguments.extract()?;
+    let method = arguments.method.method("method")?;
+    let law = (
+        arguments.controller,
+        arguments.gains.as_ref(),
+        arguments.setpoint.as_ref(),
+    );
     for_either!(or_default(arguments.arm)?, arm => {
-        let gains = gains::read(arguments.gains.as_ref(), Gains::default())?;
-        let setpoint = joints_or("setpoint", arguments.setpoint.as_ref(), Bound::Finite, [0.0; _])?;
-        let control = ControlLoop::new(arm, gains, Setpoint::at(setpoint)).with_method(method).with_period(period);
-        let start = read_state(("q", arguments.q.as_ref()), ("qd", arguments.qd.as_ref()))?;
+        let control = robot.of(read_loop(arm, law)?.with_method(method))?;
+        let start = read_state(arguments.q.as_ref(), arguments.qd.as_ref())?;
         let motion = Motion::ahead(&control, &start);
         let mut search = Paused::new(search_limits(control));
         let limits = until_done(py, || search.advance())?;
@@ -72,7 +111,6 @@ fn listed_limits<'py, const N: usize>(
     motion: Motion,
     is_free: bool,
 ) -> PyResult<Held<'py, PyDict>> {
-    let motion_limit = Some(motion.timestep).filter(|timestep| timestep.is_finite());
     let critical = limits.critical.map(|critical| {
         let found = PyDict::new(py);
         found.set_item("growth_per_step", critical.growth_per_step)?;
@@ -81,15 +119,16 @@ fn listed_limits<'py, const N: usize>(
         PyResult::Ok(found)
     });
     let found = PyDict::new(py);
-    found.set_item("control_period_limit", clocks.period)?;
-    found.set_item("timestep_limit", clocks.timestep)?;
-    found.set_item("timestep_limit_held", limits.held)?;
-    found.set_item("timestep_limit_continuous", limits.continuous)?;
+    found.set_item("control_period_limit", or_none(clocks.period))?;
+    found.set_item("timestep_limit", or_none(clocks.timestep))?;
+    found.set_item("timestep_limit_held", or_none(limits.held))?;
+    found.set_item("timestep_limit_continuous", or_none(limits.continuous))?;
     found.set_item("equilibrium", limits.equilibrium.to_pyarray(py))?;
     found.set_item("equilibrium_kind", limits.rest.name())?;
-    found.set_item("minimum_over_poses_held", limits.minimum_held)?;
-    found.set_item("minimum_over_poses_continuous", limits.minimum_continuous)?;
-    found.set_item("minimum_over_poses_bound", limits.bound)?;
+    let [held, continuous] = [limits.minimum_held, limits.minimum_continuous];
+    found.set_item("minimum_over_poses_held", or_none(held))?;
+    found.set_item("minimum_over_poses_continuous", or_none(continuous))?;
+    found.set_item("minimum_over_poses_bound", known(limits.bound))?;
     found.set_item("bound_is_proven", limits.bound_is_proven)?;
     found.set_item("certified", limits.certified)?;
     found.set_item(
@@ -97,20 +136,39 @@ fn listed_limits<'py, const N: usize>(
         limits.worst_pose.map(|pose| pose.to_pyarray(py)),
     )?;
     found.set_item("critical", critical.transpose()?)?;
-    found.set_item("timestep_limit_motion", motion_limit)?;
+    found.set_item("timestep_limit_motion", motion.timestep)?;
     found.set_item("motion_speed", motion.speed)?;
-    found.set_item("advised_timestep", limits.advised_for(&motion))?;
-    found.set_item("advised_duration", is_free.then_some(FREE_SECONDS))?;
+    let is_limited = limits.advised.is_some() || motion.timestep.is_finite();
+    let advised = limits.advised_for(&motion);
+    found.set_item(
+        "advised_timestep",
+        if is_limited {
+            known(advised)
+        } else {
+            or_none(advised)
+        },
+    )?;
+    found.set_item("advised_duration", known(is_free.then_some(FREE_SECONDS)))?;
     Ok(found)
 }
 
+/// A limit; infinity if there is none.
+fn or_none(limit: Option<f64>) -> f64 {
+    limit.unwrap_or(f64::INFINITY)
+}
+
+/// A value; NaN if it is not known.
+fn known(value: Option<f64>) -> f64 {
+    value.unwrap_or(f64::NAN)
+}
+
 fn read_state<const N: usize>(
-    (q, position): (&str, Option<&Object<'_>>),
-    (qd, velocity): (&str, Option<&Object<'_>>),
+    q: Option<&Object<'_>>,
+    qd: Option<&Object<'_>>,
 ) -> PyResult<State<N>> {
     Ok(State {
-        position: joints_or(q, position, Bound::Finite, [0.0; N])?,
-        velocity: joints_or(qd, velocity, Bound::Finite, [0.0; N])?,
+        position: joints_or("q", q, Bound::Finite, [0.0; N])?,
+        velocity: joints_or("qd", qd, Bound::Finite, [0.0; N])?,
     })
 }
 
@@ -121,41 +179,59 @@ fn read_state<const N: usize>(
 #[pyo3(from_item_all)]
 pub(crate) struct RolloutArguments<'py> {
     arm: Option<Given<'py>>,
-    q0: Option<Object<'py>>,
-    qdot0: Option<Object<'py>>,
+    q: Option<Object<'py>>,
+    qd: Option<Object<'py>>,
     duration: Real,
     timestep: Real,
-    integrator: Name,
+    method: Name,
     gains: Option<Object<'py>>,
     setpoint: Option<Object<'py>>,
     samples: Whole,
     reference: Flag,
-    control_period: Real,
+    controller: Flag,
+    t_eval: Option<Object<'py>>,
+    effort: Option<Object<'py>>,
+    return_reference: Flag,
     tableau: Option<Tableau>,
 }
 
 #[pyfunction]
 #[pyo3(signature = (arguments, /))]
-pub(crate) fn rollout<'py>(
-    py: Python<'py>,
-    arguments: RolloutArguments<'py>,
-) -> PyResult<Held<'py, PyDict>> {
+pub(crate) fn rollout<'py>(py: Python<'py>, arguments: Object<'py>) -> PyResult<Held<'py, PyDict>> {
     let _floats = Promised::begin();
-    let duration = arguments.duration.read("duration")?;
+    let robot: Robot<'_> = arguments.extract()?;
+    let arguments: RolloutArguments<'_> = arguments.extract()?;
+    let mut duration = arguments.duration.read("duration")?;
     let timestep = arguments.timestep.read("timestep")?;
-    let samples = arguments.samples.read("samples")?;
-    let reference = arguments.reference.read("reference")?;
-    let period = read_period(arguments.control_period)?;
-    let method = arguments.integrator.method("integrator")?;
-    let own = arguments.tableau.map(Tableau::read).transpose()?;
-    let own = own.map(|given| given.pair().clone());
+    let mut samples = arguments.samples.read("samples")?;
+    let keeps_reference = arguments.return_reference.read("return_reference")?;
+    let reference = arguments.reference.read("reference")? || keeps_reference;
+    let mut sampled = vec![];
+    if let Some(times) = &arguments.t_eval {
+        let times = ArrayArgument::read("t_eval", times)?;
+        (sampled, duration) = read_times(times.list(Bound::NotNegative)?, timestep)?;
+        samples = u64::try_from(sampled.len()).unwrap_or(u64::MAX).max(2);
+    }
+    let efforts = arguments.effort.as_ref();
+    let efforts = efforts.map(|effort| ArrayArgument::read("effort", effort));
+    let efforts = efforts.transpose()?;
+    let law = (
+        arguments.controller,
+        arguments.gains.as_ref(),
+        arguments.setpoint.as_ref(),
+    );
+    let method = arguments.method.method("method")?;
+    let own = read_own(arguments.tableau)?;
     for_either!(or_default(arguments.arm)?, arm => {
-        run(py, own, RolloutRequest {
-            control: read_loop(arm, arguments.gains.as_ref(), arguments.setpoint.as_ref())?
-                .with_method(method)
-                .with_timestep(timestep)
-                .with_period(period),
-            start: read_state(("q0", arguments.q0.as_ref()), ("qdot0", arguments.qdot0.as_ref()))?,
+        let course = Course {
+            sampled,
+            own: own.clone(),
+            efforts: efforts.as_ref().map_or(Ok(vec![]), ArrayArgument::each)?,
+            keeps_reference,
+        };
+        run(py, course, RolloutRequest {
+            control: robot.of(read_loop(arm, law)?.with_method(method).with_timestep(timestep))?,
+            start: read_state(arguments.q.as_ref(), arguments.qd.as_ref())?,
             duration,
             samples,
             reference,
@@ -166,20 +242,21 @@ pub(crate) fn rollout<'py>(
 /// Makes the run alone, which is timed, and repeats it beside its reference, if one is requested.
 fn run<const N: usize>(
     py: Python<'_>,
-    own: Option<Pair>,
+    course: Course<N>,
     request: RolloutRequest<N>,
 ) -> PyResult<Held<'_, PyDict>> {
     let steps = request.steps().map_err(refused)?;
     // More memory than two runs and the answer need. It is checked first, because the run's vectors
     // abort without memory.
     let samples = usize::try_from(request.samples.min(steps + 1)).unwrap_or(usize::MAX);
+    let samples = samples.max(course.sampled.len()) + course.efforts.len();
     drop(room::<[f64; 80]>(samples)?);
     let mut took = Duration::ZERO;
-    let alone = RolloutRequest {
+    let own = RolloutRequest {
         reference: false,
         ..request
     };
-    let mut alone = Paused::new(rollout_by(alone, own.clone()));
+    let mut alone = Paused::new(rollout_along(own, course.clone()));
     let mut made = until_done(py, || {
         let began = Instant::now();
         let made = alone.advance();
@@ -187,10 +264,28 @@ fn run<const N: usize>(
         made
     })?;
     if request.reference {
-        let mut compared = Paused::new(rollout_by(request, own));
+        let mut compared = Paused::new(rollout_along(request, course));
         made = until_done(py, || compared.advance())?;
     }
     listed_run(py, &made.map_err(refused)?, took)
+}
+
+/// The steps nearest to some times [s], which do not decrease, and the last time.
+fn read_times(times: &[f64], timestep: f64) -> PyResult<(Vec<u64>, f64)> {
+    let pairs = times.iter().zip(times.iter().skip(1));
+    if let Some((before, after)) = pairs.into_iter().find(|(before, after)| after < before) {
+        return Err(refused(format_args!(
+            "t_eval must not decrease, got {after} after {before}"
+        )));
+    }
+    let last = times.last().copied();
+    let last = last.ok_or_else(|| refused("t_eval must have at least one time, got none"))?;
+    let most = in_f64(MAX_STEPS);
+    // Wrong timesteps, and too many steps, are refused by the run.
+    let steps = times
+        .iter()
+        .map(|&time| steps_in(time, timestep).round().clamp(0.0, most));
+    Ok((collected(times.len(), steps.map(whole))?, last))
 }
 
 fn listed_run<'py, const N: usize>(
@@ -215,11 +310,19 @@ fn listed_run<'py, const N: usize>(
     found.set_item("energy", run.energy.to_pyarray(py))?;
     found.set_item("evaluations", run.evaluations)?;
     found.set_item("wall_time", took.as_secs_f64())?;
-    found.set_item("error", error)?;
-    found.set_item("error_uncertainty", uncertainty)?;
-    found.set_item("sampling_error", sampling)?;
-    found.set_item("sampling_error_uncertainty", sampling_uncertainty)?;
+    found.set_item("error", known(error))?;
+    found.set_item("error_uncertainty", known(uncertainty))?;
+    found.set_item("sampling_error", known(sampling))?;
+    found.set_item("sampling_error_uncertainty", known(sampling_uncertainty))?;
     found.set_item("divergence", divergence)?;
+    let states = run.reference.iter();
+    let (positions, velocities): (Vec<_>, Vec<_>) =
+        states.map(|state| (state.position, state.velocity)).unzip();
+    let given = (!positions.is_empty()).then_some(());
+    let positions = given.map(|()| rows(&positions)).transpose()?;
+    let velocities = given.map(|()| rows(&velocities)).transpose()?;
+    found.set_item("reference_positions", positions)?;
+    found.set_item("reference_velocities", velocities)?;
     Ok(found)
 }
 
@@ -233,16 +336,18 @@ pub(crate) struct GainsArguments<'py> {
     settling_time: Real,
     margin: Real,
     timestep: Real,
-    integrator: Name,
+    method: Name,
 }
 
 #[pyfunction]
 #[pyo3(signature = (arguments, /))]
 pub(crate) fn suggest_gains<'py>(
     py: Python<'py>,
-    arguments: GainsArguments<'py>,
+    arguments: Object<'py>,
 ) -> PyResult<Held<'py, PyDict>> {
     let _floats = Promised::begin();
+    let robot: Robot<'_> = arguments.extract()?;
+    let arguments: GainsArguments<'_> = arguments.extract()?;
     let settling_time = arguments.settling_time;
     let requirements = GainsRequirements {
         settling_time: fields::number("settling_time", settling_time, Bound::Positive)?,
@@ -254,16 +359,16 @@ pub(crate) fn suggest_gains<'py>(
             requirements.margin
         )));
     }
-    let method = arguments.integrator.method("integrator")?;
+    let method = arguments.method.method("method")?;
     let timestep = fields::number("timestep", arguments.timestep, Bound::Positive)?;
     for_either!(or_default(arguments.arm)?, arm => {
-        let control = ControlLoop::free(arm).with_method(method).with_timestep(timestep);
+        let control = robot.of(ControlLoop::free(arm).with_method(method).with_timestep(timestep))?;
         let mut search = Paused::new(search_gains(control, requirements));
         let found = until_done(py, || search.advance())?.map_err(refused)?;
         let listed = gains::listed(py, &found.gains)?;
-        listed.set_item("timestep_limit", found.limit)?;
+        listed.set_item("timestep_limit", or_none(found.limit))?;
         listed.set_item("certified", found.certified)?;
-        listed.set_item("margin", found.limit.map(|limit| limit / timestep))?;
+        listed.set_item("margin", or_none(found.limit) / timestep)?;
         listed.set_item("settled_after", found.settled_after)?;
         Ok(listed)
     })
@@ -278,31 +383,34 @@ pub(crate) struct PlanArguments<'py> {
     error: Real,
     arm: Option<Given<'py>>,
     duration: Option<Real>,
-    q0: Option<Object<'py>>,
-    qdot0: Option<Object<'py>>,
+    q: Option<Object<'py>>,
+    qd: Option<Object<'py>>,
     gains: Option<Object<'py>>,
     setpoint: Option<Object<'py>>,
-    control_period: Real,
+    controller: Flag,
     tableau: Option<Tableau>,
 }
 
 #[pyfunction]
 #[pyo3(signature = (arguments, /))]
-pub(crate) fn plan<'py>(
-    py: Python<'py>,
-    arguments: PlanArguments<'py>,
-) -> PyResult<Held<'py, PyDict>> {
+pub(crate) fn plan<'py>(py: Python<'py>, arguments: Object<'py>) -> PyResult<Held<'py, PyDict>> {
     let _floats = Promised::begin();
+    let robot: Robot<'_> = arguments.extract()?;
+    let arguments: PlanArguments<'_> = arguments.extract()?;
     let error = fields::number("error", arguments.error, Bound::Positive)?;
-    let period = read_period(arguments.control_period)?;
-    let own = arguments.tableau.map(Tableau::read).transpose()?;
-    let own = own.map(|given| given.pair().clone());
+    let law = (
+        arguments.controller,
+        arguments.gains.as_ref(),
+        arguments.setpoint.as_ref(),
+    );
+    let own = read_own(arguments.tableau)?;
     for_either!(or_default(arguments.arm)?, arm => {
-        let control = read_loop(arm, arguments.gains.as_ref(), arguments.setpoint.as_ref())?.with_period(period);
+        let control = robot.of(read_loop(arm, law)?)?;
+        let period = control.period;
         let usual = if control.is_free() { 10.0 } else { 4.0 };
         let task = Task {
             control,
-            start: read_state(("q0", arguments.q0.as_ref()), ("qdot0", arguments.qdot0.as_ref()))?,
+            start: read_state(arguments.q.as_ref(), arguments.qd.as_ref())?,
             duration: fields::number("duration", arguments.duration.unwrap_or(Real::Is(usual)), Bound::Positive)?,
             error,
         };
@@ -312,22 +420,33 @@ pub(crate) fn plan<'py>(
     })
 }
 
-/// The loop with `gains`. Without them the arm is free, and a setpoint would have no effect.
+/// Whether the controller is on, its gains and its setpoint.
+type Law<'a, 'py> = (Flag, Option<&'a Object<'py>>, Option<&'a Object<'py>>);
+
+/// A method of one's own, if there is one.
+fn read_own(tableau: Option<Tableau>) -> PyResult<Option<Pair>> {
+    let own = tableau.map(Tableau::read).transpose()?;
+    Ok(own.map(|given| given.pair().clone()))
+}
+
+/// The loop with these gains, by default those of a new arm. Without a controller the arm is free, and gains and
+/// setpoint would have no effect.
 fn read_loop<const N: usize>(
     arm: Rods<N>,
-    gains: Option<&Object<'_>>,
-    setpoint: Option<&Object<'_>>,
+    (controller, gains, setpoint): Law<'_, '_>,
 ) -> PyResult<ControlLoop<N>> {
-    if let (None, Some(setpoint)) = (gains, setpoint) {
-        return Err(refused(format_args!(
-            "setpoint needs gains, got {}",
-            fields::shown(setpoint)
-        )));
+    if !controller.read("controller")? {
+        for (name, given) in [("gains", gains), ("setpoint", setpoint)] {
+            if let Some(given) = given {
+                return Err(refused(format_args!(
+                    "{name} needs the controller, got {}",
+                    fields::shown(given)
+                )));
+            }
+        }
+        return Ok(ControlLoop::free(arm));
     }
-    let gains = gains.map_or_else(
-        || Ok(no_control()),
-        |given| gains::read(Some(given), Gains::default()),
-    )?;
+    let gains = gains::read(gains, Gains::default())?;
     let setpoint = Setpoint::at(joints_or("setpoint", setpoint, Bound::Finite, [0.0; N])?);
     Ok(ControlLoop::new(arm, gains, setpoint))
 }
@@ -340,10 +459,10 @@ fn listed_plan<'py>(
     let best = &planned.best;
     let all = || planned.candidates.iter().rev();
     let found = PyDict::new(py);
-    found.set_item("integrator", best.method.name())?;
+    found.set_item("method", best.method.name())?;
     found.set_item("timestep", best.timestep)?;
     let given = |period: f64| if period > 0.0 { period } else { best.timestep };
-    found.set_item("control_period", period.map(given))?;
+    found.set_item("control_period", known(period.map(given)))?;
     found.set_item(
         "evaluations_per_second",
         f64::from(best.method.evaluations()) / best.timestep,

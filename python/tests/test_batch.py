@@ -6,12 +6,14 @@ import pytest
 import pendularm
 
 METHODS = ["euler", "midpoint", "verlet", "rk4"]
+FORMS = ["clamp", "none", "conditional", "back_calculation"]
 
 
 def settings(links, arms, seed=1):
     """Arms with different settings, and the single simulations to compare them with."""
     random = np.random.default_rng(seed)
     rows = lambda low, high: random.uniform(low, high, (arms, links))
+    robot = np.arange(arms)[:, None] % 5
     given = {
         "lengths": rows(0.5, 2.0),
         "masses": rows(0.5, 2.0),
@@ -19,30 +21,35 @@ def settings(links, arms, seed=1):
         "kp": rows(0, 200),
         "ki": rows(0, 50),
         "kd": rows(0, 20),
-        "positions": rows(-2, 2),
-        "velocities": rows(-1, 1),
-        "position": rows(-3, 3),
-        "velocity": rows(-2, 2),
+        "setpoint": (rows(-2, 2), rows(-1, 1)),
+        "q": rows(-3, 3),
+        "qd": rows(-2, 2),
+        # Every fifth arm has ideal motors, joints and sensors, every seventh one a joint without a motor.
+        "effort_limit": np.where(robot == 0, np.inf, np.where(np.arange(arms)[:, None] % 7, rows(1, 60), 0)),
+        "anti_windup": [FORMS[arm % 4] for arm in range(arms)],
+        "tracking_time": random.uniform(0.01, 1, arms),
+        "viscous": np.where(robot == 0, 0, rows(0, 2)),
+        "encoder_step": np.where(robot == 0, 0, rows(0, 1e-2)),
+        "velocity_source": [("exact", "difference")[arm % 5 % 2] for arm in range(arms)],
         "method": [METHODS[arm % 4] for arm in range(arms)],
         "timestep": random.uniform(1e-4, 2e-3, arms),
         # Every third controller runs in every step.
         "control_period": np.where(np.arange(arms) % 3 == 0, 0, random.uniform(0, 1e-2, arms)),
-        "control_delay": np.arange(arms) % 3 == 2,
+        "control_delay": np.arange(arms) % 3 // 2 * (1 + np.arange(arms) % 16),
     }
     singles = []
     for arm in range(arms):
         one = pendularm.Simulation(
             pendularm.Arm(
-                links, lengths=given["lengths"][arm], masses=given["masses"][arm], gravity=given["gravity"][arm]
+                links, **{name: given[name][arm] for name in ("lengths", "masses", "gravity", "viscous")}
             ),
-            method=given["method"][arm],
-            timestep=given["timestep"][arm],
-            control_period=given["control_period"][arm],
-            control_delay=given["control_delay"][arm],
+            **{name: given[name][arm] for name in ("method", "timestep", "control_period", "control_delay")},
+            **{name: given[name][arm] for name in ("effort_limit", "anti_windup", "tracking_time")},
+            **{name: given[name][arm] for name in ("encoder_step", "velocity_source")},
         )
         one.set_gains(given["kp"][arm], given["ki"][arm], given["kd"][arm])
-        one.set_setpoint(given["positions"][arm], given["velocities"][arm])
-        one.set_state(given["position"][arm], given["velocity"][arm])
+        one.set_setpoint(*(rows[arm] for rows in given["setpoint"]))
+        one.set_state(given["q"][arm], given["qd"][arm])
         one.enable()
         singles.append(one)
     return given, singles
@@ -50,12 +57,14 @@ def settings(links, arms, seed=1):
 
 def batch_of(given, links, arms, threads):
     batch = pendularm.Batch(arms, links, threads=threads)
-    batch.set_params(given["gravity"], given["masses"], given["lengths"])
+    batch.set_params(given["gravity"], given["masses"], given["lengths"], given["viscous"])
     batch.set_integrator(given["method"], given["timestep"])
     batch.set_control_period(given["control_period"], given["control_delay"])
     batch.set_gains(given["kp"], given["ki"], given["kd"])
-    batch.set_setpoint(given["positions"], given["velocities"])
-    batch.set_state(given["position"], given["velocity"])
+    batch.set_limits(given["effort_limit"], given["anti_windup"], given["tracking_time"])
+    batch.set_sensors(given["encoder_step"], given["velocity_source"])
+    batch.set_setpoint(*given["setpoint"])
+    batch.set_state(given["q"], given["qd"])
     batch.enable()
     return batch
 
@@ -81,18 +90,29 @@ def test_every_lane_is_a_single_arm(links, threads):
         one.step(150)
     compare(batch, singles)
 
-    # An effort added to the controllers', only for the steps of the call.
+    # An effort in place of the controllers', only for the steps of the call.
     effort = np.random.default_rng(2).uniform(-3, 3, (arms, links))
     batch.step(40, effort)
-    for one, push in zip(singles, effort, strict=True):
-        one.disturb(push, 40 * one.timestep)
-        one.step(40)
+    for one, each in zip(singles, effort, strict=True):
+        one.step(40, each)
     compare(batch, singles)
+    limit, steady = given["effort_limit"], ~batch.diverged
+    assert steady.sum() > 60
+    assert np.array_equal(batch.effort[steady], np.clip(effort, -limit, limit)[steady])
     batch.step()
     for one in singles:
         one.step()
     compare(batch, singles)
     assert not np.array_equal(batch.effort, effort)
+
+    # An effort added to the controllers', for a time.
+    duration = np.linspace(0.001, 0.02, arms)
+    batch.disturb(effort, duration)
+    batch.step(30)
+    for one, push, time in zip(singles, effort, duration, strict=True):
+        one.disturb(push, time)
+        one.step(30)
+    compare(batch, singles)
 
     each = np.arange(arms)
     batch.step(each)
@@ -108,18 +128,18 @@ def test_every_lane_is_a_single_arm(links, threads):
 
 
 def test_one_control_period_for_all_and_what_is_left_out_stays():
-    batch, one = pendularm.Batch(3, threads=1), pendularm.Simulation(control_period=0.01, control_delay=True)
-    batch.set_control_period(0.01, [True] * 3)
-    batch.set_control_period(control_delay=np.False_)
-    batch.set_control_period(control_delay=True)
+    batch, one = pendularm.Batch(3, threads=1), pendularm.Simulation(control_period=0.01, control_delay=2)
+    batch.set_control_period(0.01, [1] * 3)
+    batch.set_control_period(control_delay=np.uint8(0))
+    batch.set_control_period(control_delay=2)
     batch.set_control_period()
     for each in [batch, one]:
         each.enable()
         each.set_setpoint([0.3, -0.5])
         each.step(333)
     assert batch.position.tolist() == [one.position.tolist()] * 3
-    batch.set_control_period([0, 0.01, 0.01], [False, True, True])
-    one.control_period, one.control_delay = 0, False
+    batch.set_control_period([0, 0.01, 0.01], [0, 2, 2])
+    one.control_period, one.control_delay = 0, 0
     batch.step(7)
     one.step(7)
     assert batch.position[0].tolist() == one.position.tolist()

@@ -36,6 +36,41 @@ def test_all_terms_are_those_of_the_reference_values():
     assert seen > 50
 
 
+def test_the_linear_system_is_the_slope_of_the_motion(links):
+    """Each column of A and B is a central difference of the motion, whose error is below 1e-8 here."""
+    random = np.random.default_rng(5)
+    for trial in range(20):
+        of = {name: random.uniform(0.3, 2, links) for name in ("lengths", "masses", "viscous")}
+        arm = pendularm.Arm(links, **of, gravity=[9.81, 0.0][trial % 2])
+        q = random.uniform(-3, 3, links)
+        hold = dynamics.gravity_load(arm, q)
+
+        def motion(around, arm=arm, q=q, hold=hold):
+            x, v, u = np.split(around, 3)
+            return np.concatenate([v, dynamics.forward_dynamics(arm, q + x, v, hold + u)])
+
+        a, b = pendularm.linearize(arm, q)
+        step = 1e-4 * np.eye(3 * links)
+        slope = np.stack([(motion(one) - motion(-one)) / 2e-4 for one in step], axis=1)
+        scale = np.abs(slope).max()
+        assert a.shape == (2 * links, 2 * links) and b.shape == (2 * links, links)
+        assert np.abs(np.hstack([a, b]) - slope).max() < 3e-7 * scale
+    with pytest.raises(ValueError, match=r"^q must be an array of 2 numbers"):
+        pendularm.linearize(pendularm.Arm(), [0.0, 0.0, 0.0])
+
+
+def test_friction_is_in_the_motion_and_in_the_effort_for_it(links):
+    random = np.random.default_rng(6)
+    q, qd, qdd = (random.uniform(-3, 3, (150, links)) for _ in range(3))
+    plain, viscous = pendularm.Arm(links), [0.7, 0.2, 0.1][:links]
+    arm = pendularm.Arm(links, viscous=viscous)
+    effort = dynamics.inverse_dynamics(arm, q, qd, qdd)
+    assert np.array_equal(effort, dynamics.inverse_dynamics(plain, q, qd, qdd) + viscous * qd)
+    assert np.allclose(dynamics.forward_dynamics(arm, q, qd, effort), qdd, rtol=0, atol=1e-11)
+    expected = dynamics.forward_dynamics(plain, q, qd, effort - viscous * qd)
+    assert np.array_equal(dynamics.forward_dynamics(arm, q, qd, effort), expected)
+
+
 def test_many_states_are_as_many_single_ones(links):
     random = np.random.default_rng(3)
     arm = pendularm.Arm(links)
@@ -98,7 +133,7 @@ def test_shapes_are_checked():
         dynamics.coriolis(arm, np.zeros((3, 2)), np.zeros((2, 2)))
     with pytest.raises(ValueError, match=r"q must have the shape \(2,\) or \(n, 2\), got \(\)"):
         dynamics.gravity_load(arm, 1.0)
-    with pytest.raises(ValueError, match="q must be an array of numbers, got None"):
+    with pytest.raises(TypeError, match="q must be an array of numbers, got None"):
         dynamics.gravity_load(arm, None)
 
 

@@ -170,7 +170,7 @@ def test_some_of_the_arms_can_be_reset_alone(name):
     after, _ = env.reset(options={"reset_mask": mask})
     assert np.array_equal(after[[0, 2]], before[[0, 2]])
     assert not np.array_equal(after[1], before[1])
-    with pytest.raises(ValueError, match="options must be a dict or None, got 5"):
+    with pytest.raises(TypeError, match="options must be a dict or None, got 5"):
         env.reset(options=5)
     with pytest.raises(ValueError, match="reset_mask must be"):
         env.reset(options={"reset_mask": [True]})
@@ -232,7 +232,7 @@ def test_a_seed_may_be_any_whole_number(name):
 def test_a_seed_that_is_none_is_refused_and_changes_nothing(seed, said):
     env = pendularm.envs.PendularmVectorEnv(3)
     env.reset(seed=1)
-    with pytest.raises(ValueError) as refusal:
+    with pytest.raises((TypeError, ValueError)) as refusal:
         env.reset(seed=seed)
     assert str(refusal.value).startswith(said)
     assert env.np_random_seed == (1, 2, 3)
@@ -279,13 +279,13 @@ def test_method_and_timestep_can_be_set(name, method, timestep):
 @pytest.mark.parametrize("kind", [pendularm.envs.PendularmEnv, pendularm.envs.PendularmReachVectorEnv])
 @pytest.mark.parametrize("timestep", [0, -0.01, 0.03, 0.1, 1e-7, 5e-324, np.nan, np.inf, "1", None, True, [0.01, 0.02]])
 def test_a_timestep_that_does_not_divide_a_step_is_refused(kind, timestep):
-    with pytest.raises(ValueError, match="^timestep must be "):
+    with pytest.raises((TypeError, ValueError), match="^timestep must be "):
         kind(timestep=timestep)
 
 
 @pytest.mark.parametrize("method", ["RK4", "", None, 4, ["rk4"]])
 def test_a_method_that_is_none_is_refused(method):
-    with pytest.raises(ValueError, match="^method must be "):
+    with pytest.raises((TypeError, ValueError), match="^method must be "):
         pendularm.envs.PendularmEnv(method=method)
 
 
@@ -363,7 +363,7 @@ def test_masked_actions_are_refused():
 
 def test_errors_of_the_batch_have_the_callers_name(name):
     for arms in [0, 2.5, 10**7]:
-        with pytest.raises(ValueError, match=f"^num_envs must be between 1 and 1000000, got {arms}$"):
+        with pytest.raises((TypeError, ValueError), match=f"^num_envs must be between 1 and 1000000, got {arms}$"):
             gymnasium.make_vec(name, arms)
     one = gymnasium.make(name).unwrapped
     one.reset(seed=0)
@@ -373,7 +373,7 @@ def test_errors_of_the_batch_have_the_callers_name(name):
 
 @pytest.mark.parametrize("steps", [0, -2, 2.0, "2", np.float64(3), True])
 def test_an_episode_has_a_whole_number_of_steps(steps):
-    with pytest.raises(ValueError, match="^max_episode_steps must be (a whole number|at least 1, or -1 for no limit)"):
+    with pytest.raises((TypeError, ValueError), match="^max_episode_steps must be (a whole number|at least 1, or -1 for no limit)"):
         pendularm.envs.PendularmVectorEnv(2, max_episode_steps=steps)
     pendularm.envs.PendularmVectorEnv(2, max_episode_steps=np.int64(1))
 

@@ -13,7 +13,7 @@ import pytest
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
-@pytest.mark.parametrize("name", ["closed_loop.py", "lesson.ipynb", "live_client.py", "policy.py"])
+@pytest.mark.parametrize("name", ["closed_loop.py", "lesson.ipynb", "live_client.py", "optimize.py", "policy.py", "underactuated.py"])
 def test_an_example_needs_the_wheel_and_not_an_index_that_has_it(name):
     said = (EXAMPLES / name).read_text(encoding="utf-8").split("pip install ")[1:]
     assert all(".whl" in command.split("`")[0] for command in said)
@@ -93,3 +93,10 @@ def test_a_loop_that_is_closed_over_the_wire_is_that_of_the_offline_arm_to_the_b
         assert time == 4
         away[law] = np.abs(np.array([0.8, -0.6, 0.4][:links]) - position).max()
     assert away["lqr"] < away["pd"] < 0.02
+
+
+def test_gains_by_optuna_hold_the_arm():
+    run = subprocess.run([sys.executable, str(EXAMPLES / "optimize.py")], capture_output=True, text=True, timeout=600)
+    assert run.returncode == 0, run.stderr
+    # The arm sags without an integral.
+    assert 0.0 < float(run.stdout.split()[0]) < 0.08

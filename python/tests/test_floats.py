@@ -77,7 +77,7 @@ def of_the_equation():
 
 
 def of_the_study():
-    run = pendularm.rollout(duration=0.3, q0=[0.4, 1e-310], gains={}, reference=True)
+    run = pendularm.rollout(duration=0.3, q=[0.4, 1e-310], gains={}, reference=True)
     limits = pendularm.stability(setpoint=[0.3, -0.4])
     return [run.positions.tobytes(), run.error, run.energy.tobytes(), limits.timestep_limit, limits.advised_timestep]
 
@@ -91,7 +91,7 @@ def of_the_environments():
 
 
 def of_a_sweep():
-    found = pendularm.sweep(GRID, "final_error", q0=1e-310, duration=0.2, progress=False)
+    found = pendularm.sweep(GRID, "final_error", q=1e-310, duration=0.2, progress=False)
     return found["final_error"].tolist()
 
 

@@ -37,7 +37,7 @@ TAKERS = {
     "count": pendularm.Batch,
     "lengths": lambda long: pendularm.Arm(lengths=long),
     "dynamics": lambda long: pendularm.dynamics.mass_matrix(ARM, long),
-    "rollout": lambda long: pendularm.rollout(q0=long),
+    "rollout": lambda long: pendularm.rollout(q=long),
     "sweep": lambda long: pendularm.sweep({"kp": [long]}),
     "duration": lambda long: pendularm.sweep({"kp": [1]}, duration=long),
 }
@@ -46,7 +46,7 @@ TAKERS = {
 @pytest.mark.parametrize("long", LONG, ids=["range", "huge", "endless", "inside", "behind"])
 @pytest.mark.parametrize("take", TAKERS.values(), ids=TAKERS.keys())
 def test_a_sequence_that_is_too_long_is_refused_at_once(take, long):
-    with pytest.raises(ValueError):
+    with pytest.raises((TypeError, ValueError)):
         take(long)
 
 

@@ -14,18 +14,22 @@ NAMES = {**vars(pendularm), "HIDDEN": HIDDEN, "math": math, "np": np, "pathlib":
 
 
 def state(arm, batch):
-    arrays = [arm.position, *arm.gains.values(), batch.position, batch.effort, batch.time]
-    return [arm.timestep, arm.method, arm.control_period, arm.enabled, *(array.tolist() for array in arrays)]
+    arrays = [arm.position, arm.effort_limit, arm.encoder_step, *arm.gains.values(), batch.position, batch.effort, batch.time]
+    names = ["timestep", "method", "control_period", "control_delay", "anti_windup", "tracking_time", "enabled"]
+    return [*(getattr(arm, name) for name in names), *(array.tolist() for array in arrays)]
 
 
 @pytest.mark.parametrize("row", [row for row in ROWS if row and not row.startswith("#")])
 def test_a_bad_value_is_refused_by_the_name_of_its_field(row):
     wrong, said = row.split(" => ")
+    kind = TypeError if said.startswith("TypeError: ") else ValueError
+    said = said.removeprefix("TypeError: ")
     arm, batch = pendularm.Simulation(), pendularm.Batch(3)
     before = state(arm, batch)
     names = {**NAMES, "arm": arm, "batch": batch}
-    with pytest.raises(ValueError) as refusal:
+    with pytest.raises((TypeError, ValueError)) as refusal:
         eval(wrong, names)
+    assert refusal.type is kind
     found = str(refusal.value)
     assert found.startswith(said[:-1]) if said.endswith("…") else found == said
     assert state(arm, batch) == before

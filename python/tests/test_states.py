@@ -14,14 +14,17 @@ HEAD = len(b"pendularm state 1")
 
 def busy(links, kind=pendularm.Simulation):
     """An arm with every part of its state in use."""
-    arm = pendularm.Arm(links, masses=[1.5, 0.8, 0.3][:links], gravity=3.7)
-    one = kind(arm, method="verlet", timestep=0.0013, control_period=0.004, control_delay=True)
+    arm = pendularm.Arm(links, masses=[1.5, 0.8, 0.3][:links], gravity=3.7, viscous=[0.3, 0.1, 0.2][:links])
+    one = kind(arm, method="verlet", timestep=0.0013, control_period=0.004, control_delay=3)
     one.set_gains(kp=[300, 80, 20][:links])
     one.set_setpoint([0.7, -0.4, 0.2][:links], [0.1] * links)
     one.step(100)
     one.timestep = 0.0007
     one.enable()
     one.step(101)
+    one.effort_limit = [40.0, np.inf, 0.0][:links]
+    one.anti_windup, one.tracking_time = "back_calculation", 0.1
+    one.encoder_step, one.velocity_source = [1e-3, 0.0, 1e-4][:links], "difference"
     one.disturb([2.0, -1.0, 0.5][:links], 0.05)
     one.step(7)
     return one
@@ -31,8 +34,10 @@ def many(links):
     batch = pendularm.Batch(40, links, threads=2)
     random = np.random.default_rng(1)
     batch.set_integrator(["euler", "midpoint", "verlet", "rk4"] * 10, random.uniform(1e-4, 1e-3, 40))
-    batch.set_control_period(random.uniform(0, 4e-3, 40), [True, False] * 20)
-    batch.set_params(gravity=random.uniform(0, 9, 40))
+    batch.set_control_period(random.uniform(0, 4e-3, 40), [0, 1, 2, 5] * 10)
+    batch.set_limits(random.uniform(1, 50, (40, links)), ["clamp", "none", "conditional", "back_calculation"] * 10)
+    batch.set_sensors(random.uniform(0, 1e-3, (40, links)), ["exact", "difference"] * 20)
+    batch.set_params(viscous=random.uniform(0, 1, (40, links)), gravity=random.uniform(0, 9, 40))
     batch.enable()
     batch.set_state(random.uniform(-1, 1, (40, links)))
     batch.step(100, [1.0] * links)
@@ -75,7 +80,7 @@ def test_a_copy_keeps_settings_and_divergence(links):
     one.set_state([0] * links, [1e200] * links)
     one.step(10)
     other = copy.copy(one)
-    for name in ["arm", "method", "timestep", "control_period", "control_delay", "enabled", "steps", "divergence"]:
+    for name in ["arm", "method", "timestep", "control_period", "control_delay", "anti_windup", "tracking_time", "velocity_source", "enabled", "steps", "divergence"]:
         assert getattr(other, name) == getattr(one, name), name
     assert other.divergence is not None
     assert other.step() == 0
@@ -95,13 +100,13 @@ def test_arrays_of_a_batch_show_the_state_that_was_set(links):
 def test_bytes_that_are_no_state_are_refused_and_change_nothing(links):
     one, batch = busy(links), many(links)
     state, whole, before = one.get_state(), batch.get_state(), values(one) + values(batch)
-    said = f"^position must be an array of numbers, or a state of get_state of 1 arms of {links} links$"
+    said = f"^q must be an array of numbers, or a state of get_state of 1 arms of {links} links$"
     other = pendularm.Simulation(pendularm.Arm(5 - links)).get_state()
     for wrong in [b"", state[:-1], state + b"0", b"p" + state, other, whole]:
         with pytest.raises(ValueError, match=said):
             one.set_state(wrong)
     for wrong in [state, whole[:-8], pendularm.Batch(39, links).get_state()]:
-        with pytest.raises(ValueError, match="^position must be an array of numbers, or a state of get_state of 40 arms "):
+        with pytest.raises(ValueError, match="^q must be an array of numbers, or a state of get_state of 40 arms "):
             batch.set_state(wrong)
     with pytest.raises(ValueError, match="^a state of get_state must be the only argument, got "):
         one.set_state(state, [0.0] * links)

@@ -3,13 +3,14 @@
 import functools
 import itertools
 import json
+import multiprocessing
 import os
 import pickle
 import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,7 @@ def test_every_setting_is_a_run_of_its_own():
 
 
 def test_a_control_period_and_its_delay_are_settings():
-    grid = {"control_period": [0, 0.004, 0.006], "control_delay": [False, np.True_]}
+    grid = {"control_period": [0, 0.004, 0.006], "control_delay": [0, np.int64(2)]}
     found = pendularm.sweep(grid, "final_error", **FIXED)["final_error"]
     assert len(set(found.flat)) == 6
     for place in np.ndindex(3, 2):
@@ -245,7 +246,7 @@ def test_a_folder_keeps_numbers_under_any_names(tmp_path):
     def many(run):
         return {name: run.energy[-1] + place for place, name in enumerate(names)}
 
-    ask = {"grid": {"kp": [1.0, 2.0]}, "metric": many, "q0": 0.5, "duration": 0.1, "folder": tmp_path}
+    ask = {"grid": {"kp": [1.0, 2.0]}, "metric": many, "q": 0.5, "duration": 0.1, "folder": tmp_path}
     expected = pendularm.sweep(**ask)
     with Counting(1) as executor:
         found = pendularm.sweep(executor=executor, **ask)
@@ -318,7 +319,7 @@ def test_a_folder_knows_the_code_of_a_metric(tmp_path):
     def last(factor, kind="position"):
         return lambda run: [factor * run.positions[-1, :, 0] for _ in (0, 1) if kind in {"position", "first"}][0]
 
-    ask = {"grid": {"kp": [1.0, 2.0]}, "q0": 0.5, "duration": 0.1, "folder": tmp_path}
+    ask = {"grid": {"kp": [1.0, 2.0]}, "q": 0.5, "duration": 0.1, "folder": tmp_path}
     found = pendularm.sweep(metric=last(1.0), **ask)["metric"]
     assert np.array_equal(pendularm.sweep(metric=last(1.0), **ask)["metric"], found)
     first, second = (lambda run: run.positions[-1, :, 0]), (lambda run: run.positions[-1, :, 1])
@@ -364,7 +365,7 @@ def test_a_folder_refuses_a_metric_whose_code_it_cannot_know(tmp_path):
     lock = threading.Lock()
     ask = {"grid": {"kp": [1.0]}, "duration": 0.1}
     for metric in [Metric(), Metric().method, functools.partial(of, held=1), lambda run: run.energy[-1] * bool(lock)]:
-        with pytest.raises(ValueError, match="^metric must be "):
+        with pytest.raises((TypeError, ValueError), match="^metric must be "):
             pendularm.sweep(metric=metric, folder=tmp_path, **ask)
         assert pendularm.sweep(metric=metric, **ask)["metric"].shape == (1,)
     assert not (tmp_path / "sweep.json").exists()
@@ -397,6 +398,55 @@ def test_processes_may_do_the_work():
     with ProcessPoolExecutor(2) as executor:
         found = pendularm.sweep(GRID, "final_error", executor=executor, piece=10, **FIXED)
     assert np.array_equal(found["final_error"], expected["final_error"])
+
+
+def loky_executor():
+    loky = pytest.importorskip("loky")
+    return loky.get_reusable_executor(2)
+
+
+# loky's own warnings are loky's.
+@pytest.mark.filterwarnings("ignore")
+def test_loky_sends_a_metric_of_a_notebook():
+    # Such a metric is in no module that a worker can import.
+    least = 0.25
+    metric = lambda run: np.maximum(np.abs(run.positions[-1] - run.setpoint).max(axis=1), least)
+    expected = pendularm.sweep(GRID, metric, **FIXED)
+    executor = loky_executor()
+    found = pendularm.sweep(GRID, metric, executor=executor, piece=10, **FIXED)
+    executor.shutdown()
+    assert np.array_equal(found["metric"], expected["metric"])
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("kind", ["processes", "loky"])
+def test_a_sweep_whose_worker_is_lost_continues_from_its_folder(kind, tmp_path):
+    if kind == "processes" and sys.platform != "linux":
+        pytest.skip("the metric is known only to a forked process")
+    parent, mark = os.getpid(), str(tmp_path / "lost")
+
+    def losing(run):
+        if os.getpid() != parent and run.positions[0, 0, 0] == 0.0 and not os.path.exists(mark):
+            time.sleep(0.5)
+            open(mark, "x").close()
+            os._exit(1)
+        return np.abs(run.positions[-1] - run.setpoint).max(axis=1)
+
+    if kind == "processes":
+        # Sent by its name, while loky sends its code.
+        globals()["losing"] = losing
+        losing.__qualname__ = "losing"
+    ask = {"grid": GRID, "metric": losing, "folder": tmp_path / "kept", "piece": 4, **FIXED}
+    begin = lambda: loky_executor() if kind == "loky" else ProcessPoolExecutor(2, multiprocessing.get_context("fork"))
+    executor = begin()
+    with pytest.raises(BrokenExecutor):
+        pendularm.sweep(executor=executor, **ask)
+    executor.shutdown()
+    executor = begin()
+    found = pendularm.sweep(executor=executor, **ask)
+    executor.shutdown()
+    expected = pendularm.sweep(GRID, losing, **FIXED)
+    assert np.array_equal(found["metric"], expected["metric"])
 
 
 @pytest.fixture

@@ -62,7 +62,8 @@ impl AntiWindup {
 /// Bounds of the efforts that the motors apply, and the anti-windup of the controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits<const N: usize> {
-    /// The largest effort of each joint \[N m\], not negative; 0 is a joint without a motor. `None`: no limit.
+    /// The largest effort of each joint \[N m\], not negative; 0 is a joint without a motor, and infinity one without a
+    /// limit. `None`: no limit.
     pub effort: Option<[f64; N]>,
     /// The form of anti-windup.
     pub anti_windup: AntiWindup,

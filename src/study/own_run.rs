@@ -23,6 +23,8 @@ pub(super) trait Recorded<const N: usize>: Steppable<N> {
     fn is_at_limit(&self) -> bool;
     /// The step that was not taken.
     fn divergence(&self) -> Option<Divergence>;
+    /// Applies `effort` \[N m\] from the next step on, in place of the controller's.
+    fn drive(&mut self, effort: [f64; N]);
 }
 
 impl<const N: usize> Recorded<N> for Simulation<N> {
@@ -45,6 +47,10 @@ impl<const N: usize> Recorded<N> for Simulation<N> {
     fn divergence(&self) -> Option<Divergence> {
         Simulation::divergence(self)
     }
+
+    fn drive(&mut self, effort: [f64; N]) {
+        Simulation::drive(self, Some(effort));
+    }
 }
 
 /// The run of a loop by a method of one's own.
@@ -57,6 +63,8 @@ pub(super) struct OwnRun<const N: usize> {
     /// The rounding error of the state, as in the live arm.
     carry: State<N>,
     effort: [f64; N],
+    /// The effort that acts in place of the controller's.
+    driven: Option<[f64; N]>,
     steps: u64,
     divergence: Option<Divergence>,
 }
@@ -71,13 +79,17 @@ impl<const N: usize> OwnRun<N> {
             state: start,
             carry: State::rest(),
             effort: [0.0; N],
+            driven: None,
             steps: 0,
             divergence: None,
         }
     }
 
     fn step(&mut self) -> bool {
-        let (control, held) = self.hold.begin_step(&self.pid, &self.state);
+        let (mut control, held) = self.hold.begin_step(&self.pid, &self.state);
+        if let Some(effort) = self.driven {
+            control.effort = self.control.limits.applied(effort);
+        }
         let ControlLoop { arm, timestep, .. } = &self.control;
         let (dq, dv) = increment(&self.pair, arm, &self.state, &control.effort, *timestep);
         let (next, carry) = add_carried(&self.state, &self.carry, &dq, &dv);
@@ -155,5 +167,9 @@ impl<const N: usize> Recorded<N> for OwnRun<N> {
 
     fn divergence(&self) -> Option<Divergence> {
         self.divergence
+    }
+
+    fn drive(&mut self, effort: [f64; N]) {
+        self.driven = Some(effort);
     }
 }

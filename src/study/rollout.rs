@@ -50,6 +50,45 @@ pub struct RolloutRequest<const N: usize> {
     pub reference: bool,
 }
 
+/// What a run may have beside its request. By default it has nothing of it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Course<const N: usize> {
+    /// The steps after which there are samples, in order, instead of evenly spaced ones. They are within the run.
+    pub sampled: Vec<u64>,
+    /// The effort of each control period \[N m\] in place of the controller's. The last one also acts in all further
+    /// periods.
+    pub efforts: Vec<[f64; N]>,
+    /// Whether the result has the samples of the reference.
+    pub keeps_reference: bool,
+    /// A method of one's own in place of the loop's.
+    pub own: Option<Pair>,
+}
+
+impl<const N: usize> Course<N> {
+    /// The step of a sample: the given one, or the nearest step for evenly spaced samples.
+    fn due(&self, index: u64, steps: u64, intervals: u64) -> u64 {
+        let given = usize::try_from(index)
+            .ok()
+            .and_then(|at| self.sampled.get(at));
+        // The product is at most 1e5 times 1e7.
+        given
+            .copied()
+            .unwrap_or((2 * index * steps + intervals) / (2 * intervals))
+    }
+
+    /// The effort in the step after `step` steps, if the controller has none, and the number of steps up to another one.
+    fn effort(&self, step: u64, period: u64) -> Option<([f64; N], u64)> {
+        let last = self.efforts.len().checked_sub(1)?;
+        let at = usize::try_from(step / period).map_or(last, |at| at.min(last));
+        let left = if at < last {
+            period - step % period
+        } else {
+            u64::MAX
+        };
+        self.efforts.get(at).map(|effort| (*effort, left))
+    }
+}
+
 /// Why a request is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RolloutError {
@@ -171,6 +210,8 @@ pub struct Rollout<const N: usize> {
     pub from_ideal: Option<Deviation>,
     /// The step that diverged, if one did.
     pub divergence: Option<Divergence>,
+    /// The samples of the reference, if they were requested; NaN once it is lost.
+    pub reference: Vec<State<N>>,
 }
 
 /// The most memory of [`rollout`] without its samples, in bytes.
@@ -185,23 +226,28 @@ pub const fn most_bytes<const N: usize>() -> usize {
 pub async fn rollout<const N: usize>(
     request: RolloutRequest<N>,
 ) -> Result<Rollout<N>, RolloutError> {
-    rollout_by(request, None).await
+    rollout_along(request, Course::default()).await
 }
 
-/// The same with a method of one's own, if there is one, in place of the loop's.
+/// Does what [`rollout`] does, with samples at other steps, with efforts that are given, or by a method of
+/// one's own. The reference has the same efforts.
 ///
 /// # Errors
 /// The reason of [`RolloutRequest::steps`].
-pub async fn rollout_by<const N: usize>(
+pub async fn rollout_along<const N: usize>(
     request: RolloutRequest<N>,
-    own: Option<Pair>,
+    course: Course<N>,
 ) -> Result<Rollout<N>, RolloutError> {
     let RolloutRequest { control, start, .. } = request;
     let steps = request.steps()?;
-    let samples = request.samples.min(steps + 1);
+    let samples = match course.sampled.len() as u64 {
+        0 => request.samples.min(steps + 1),
+        given => given,
+    };
+    let period = control.period.steps(control.timestep);
     let intervals = samples.saturating_sub(1).max(1);
-    let mut run: Box<dyn Recorded<N>> = match own {
-        Some(pair) => Box::new(OwnRun::new(control, pair, start)),
+    let mut run: Box<dyn Recorded<N>> = match &course.own {
+        Some(pair) => Box::new(OwnRun::new(control, pair.clone(), start)),
         None => Box::new(control.simulation(start)),
     };
     // On the heap, so that a run that has not begun has no memory for them.
@@ -209,7 +255,8 @@ pub async fn rollout_by<const N: usize>(
     let mut references: Option<Box<[Reference<N>; REFERENCES]>> = request
         .reference
         .then(|| Box::new(std::array::from_fn(references)));
-    let mut ideals = (request.reference && !control.is_free())
+    let has_law = !control.is_free() && course.efforts.is_empty();
+    let mut ideals = (request.reference && has_law)
         .then(|| [1, 2].map(|cuts| Ideal::new(&control, start, cuts)));
     let mut made = Rollout {
         deviation: references.as_ref().map(|_| Deviation::default()),
@@ -225,15 +272,20 @@ pub async fn rollout_by<const N: usize>(
     let mut piece = PieceWork::default();
     let mut counted = 0;
     for index in 0..samples {
-        // The step nearest to the sample, for evenly spaced samples. The product is at most 1e5 times 1e7.
-        let due = (2 * index * steps + intervals) / (2 * intervals);
+        let due = course.due(index, steps, intervals);
         while run.steps() < due && run.divergence().is_none() {
-            let ahead = due - run.steps();
-            let taken = run.advance(ahead.min(stride));
+            let mut ahead = (due - run.steps()).min(stride);
+            let driven = course.effort(run.steps(), period);
+            if let Some((effort, left)) = driven {
+                run.drive(effort);
+                ahead = ahead.min(left);
+            }
+            let taken = run.advance(ahead);
+            let applied = driven.map(|(effort, _)| control.limits.applied(effort));
             let before = std::mem::replace(&mut counted, run.evaluations());
             piece.spend(counted - before).await;
             for reference in references.as_deref_mut().into_iter().flatten() {
-                reference.follow(taken, &mut piece).await;
+                reference.follow(taken, applied, &mut piece).await;
             }
             let is_limited = run.is_at_limit();
             for ideal in ideals.iter_mut().flatten() {
@@ -245,6 +297,14 @@ pub async fn rollout_by<const N: usize>(
             break;
         }
         made.sample(&control.arm, &*run, references.as_deref(), ideals.as_ref());
+        if let (true, Some([first, ..])) = (course.keeps_reference, references.as_deref()) {
+            let lost = State {
+                position: [f64::NAN; N],
+                velocity: [f64::NAN; N],
+            };
+            made.reference
+                .push(if first.is_lost { lost } else { *first.state() });
+        }
     }
     made.steps = run.steps();
     made.evaluations = run.evaluations();
@@ -365,14 +425,15 @@ impl<const N: usize> Reference<N> {
         }
     }
 
-    /// Follows the run by this number of its steps, which is 1 with a control law.
-    async fn follow(&mut self, steps: u64, piece: &mut PieceWork) {
+    /// Follows the run by this number of its steps, which is 1 with a control law. An effort that is `applied` \[N m\]
+    /// replaces that of the law.
+    async fn follow(&mut self, steps: u64, applied: Option<[f64; N]>, piece: &mut PieceWork) {
         if self.is_lost {
             return;
         }
         self.spans += 1;
-        let mut effort = [0.0; N];
-        if self.pid.is_enabled() {
+        let mut effort = applied.unwrap_or([0.0; N]);
+        if applied.is_none() && self.pid.is_enabled() {
             let (control, held) = self.hold.begin_step(&self.pid, self.taylor.state());
             effort = control.effort;
             self.pid.commit(control.integral);
@@ -396,7 +457,7 @@ const MAX_COEFFICIENTS: u64 = 40_000_000;
 impl<const N: usize> Steppable<N> for Reference<N> {
     fn advance(&mut self, steps: u64) -> u64 {
         let mut follow = || {
-            at_once(self.follow(1, &mut PieceWork::default()));
+            at_once(self.follow(1, None, &mut PieceWork::default()));
             !self.is_lost && self.evaluations() <= MAX_COEFFICIENTS
         };
         (0..steps).take_while(|_| follow()).count() as u64

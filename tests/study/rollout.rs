@@ -9,7 +9,9 @@ use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::estimate;
 use pendularm::study::method::named;
 use pendularm::study::paused::{Paused, at_once};
-use pendularm::study::rollout::{MAX_SAMPLES, Rollout, RolloutRequest, rollout, rollout_by};
+use pendularm::study::rollout::{
+    Course, MAX_SAMPLES, Rollout, RolloutRequest, rollout, rollout_along,
+};
 use pendularm::study::tableau::Pair;
 use pendularm::study::taylor::TaylorReference;
 
@@ -44,6 +46,14 @@ fn run<const N: usize>(request: RolloutRequest<N>) -> Rollout<N> {
     at_once(rollout(request)).unwrap()
 }
 
+/// A method of one's own.
+fn by<const N: usize>(own: Option<Pair>) -> Course<N> {
+    Course {
+        own,
+        ..Course::default()
+    }
+}
+
 /// The live arm's methods by their tableaus take its steps, but for rounding.
 #[test]
 fn a_method_of_ones_own_steps_the_live_arms_loop() {
@@ -60,7 +70,7 @@ fn a_method_of_ones_own_steps_the_live_arms_loop() {
     {
         let control = request.control.with_method(method);
         let request = RolloutRequest { control, ..request };
-        let own = at_once(rollout_by(request, Some(Pair::of(method)))).unwrap();
+        let own = at_once(rollout_along(request, by(Some(Pair::of(method))))).unwrap();
         let live = run(request);
         assert_eq!(
             (&own.times, own.evaluations),
@@ -92,7 +102,10 @@ fn a_method_of_ones_own_steps_the_live_arms_loop() {
         control: wild.control.with_method(Method::Euler),
         ..wild
     });
-    assert_eq!(end(at_once(rollout_by(wild, euler)).unwrap()), end(live));
+    assert_eq!(
+        end(at_once(rollout_along(wild, by(euler))).unwrap()),
+        end(live)
+    );
 }
 
 /// A method of order 5 is more accurate than one of order 4 at the same timestep.
@@ -100,7 +113,7 @@ fn a_method_of_ones_own_steps_the_live_arms_loop() {
 fn a_method_of_ones_own_has_its_error() {
     let by = |name| {
         let pair = named(name).unwrap().pair().clone();
-        at_once(rollout_by(swing(), Some(pair))).unwrap()
+        at_once(rollout_along(swing(), by(Some(pair)))).unwrap()
     };
     let (four, five) = (by("rk4"), by("dormand_prince5"));
     let error = |run: &Rollout<2>| run.deviation.unwrap().known().unwrap();
@@ -142,6 +155,51 @@ fn a_run_has_the_nearest_number_of_steps() {
     assert_eq!(times(0.5, 0.1, 3), [0.0, 3.0, 5.0]);
     // More samples than steps: one a step.
     assert_eq!(times(0.3, 0.1, MAX_SAMPLES), [0.0, 1.0, 2.0, 3.0]);
+}
+
+/// The law's own efforts, given from outside, move the arm in the same way. The reference follows them closely.
+#[test]
+fn given_efforts_replace_the_law_and_samples_are_at_the_given_steps() {
+    let held = ControlPeriod {
+        period: 0.004,
+        delay: 0,
+    };
+    let mut request = controlled(Gains::default(), 0.001);
+    request.control = request.control.with_period(held);
+    request.duration = 0.4;
+    request.samples = 401;
+    let law = run(request);
+    let course = Course {
+        sampled: vec![0, 7, 7, 300],
+        efforts: law.efforts[1..].iter().step_by(4).copied().collect(),
+        keeps_reference: true,
+        own: None,
+    };
+    let request = RolloutRequest {
+        control: ControlLoop::free(request.control.arm)
+            .with_timestep(0.001)
+            .with_period(held),
+        reference: true,
+        ..request
+    };
+    let made = at_once(rollout_along(request, course)).unwrap();
+    assert_eq!(made.times, [0.0, 7.0 * 0.001, 7.0 * 0.001, 300.0 * 0.001]);
+    assert_eq!(made.positions[1..], [7, 7, 300].map(|at| law.positions[at]));
+    assert_eq!(made.efforts[3], law.efforts[300]);
+    assert_eq!(made.from_ideal, None);
+    let last = (made.reference[3].position, made.positions[3]);
+    let apart = (0..2).map(|joint| (last.0[joint] - last.1[joint]).abs());
+    assert_eq!(made.deviation.unwrap().error, apart.fold(0.0, f64::max));
+    assert!(made.deviation.unwrap().error < 1e-6);
+
+    // The last effort acts for the rest.
+    let constant = Course {
+        efforts: vec![[3.0, 1.0]],
+        ..Course::default()
+    };
+    let made = at_once(rollout_along(request, constant)).unwrap();
+    assert!(made.efforts[1..].iter().all(|effort| *effort == [3.0, 1.0]));
+    assert!(made.reference.is_empty());
 }
 
 /// The two references agree to rounding: a second of this motion amplifies errors some ten times.

@@ -9,7 +9,7 @@ A wrong value raises a `ValueError` that names its field.
 from importlib.metadata import version as _version
 
 from . import dynamics
-from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
+from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics, linearize
 from ._page import Page, page
 from ._ray import RayExecutor
 from .held import HeldLimit, HeldMode, held_limit
@@ -45,6 +45,7 @@ __all__ = [
     "end_effector",
     "held_limit",
     "inverse_kinematics",
+    "linearize",
     "page",
     "plan",
     "read_report",

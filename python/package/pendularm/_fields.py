@@ -1,11 +1,13 @@
-"""Readers of arguments by field name. A wrong value raises a `ValueError` that names the field."""
+"""Readers of arguments by field name. A wrong value raises a `ValueError`, and a wrong type a `TypeError`, that names
+the field."""
 
 import operator
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, Literal, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,14 @@ from ._native import PromisedFloats, as_doubles, is_masked, is_too_long
 
 Floats = NDArray[np.float64]
 
+Method = Literal["euler", "midpoint", "verlet", "rk4"]
+"""The name of a method."""
+
+AntiWindup = Literal["clamp", "none", "conditional", "back_calculation"]
+"""What the integral does while an effort is at its limit."""
+
+VelocitySource = Literal["exact", "difference"]
+"""How the controller measures velocities."""
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -28,6 +38,38 @@ def promised(function: Callable[P, T]) -> Callable[P, T]:
             return function(*args, **kwargs)
 
     return inside
+
+
+OLDER = {"integrator": "method", "q0": "q", "qdot0": "qd"}
+"""Older names of arguments, which a later version will not have."""
+
+
+def present_name(name: str) -> str:
+    """The present name of an argument of the calling function. An older one is warned of in the line that called it."""
+    if name in OLDER:
+        warnings.warn(f"{name} is an older name of {OLDER[name]}", DeprecationWarning, 3)
+    return OLDER.get(name, name)
+
+
+def renamed(function: Callable[P, T]) -> Callable[P, T]:
+    """The function, which also takes the older names of its arguments."""
+
+    @wraps(function)
+    def inside(*args: P.args, **kwargs: P.kwargs) -> T:
+        for name in OLDER.keys() & kwargs.keys():
+            present = present_name(name)
+            if present in kwargs:
+                raise TypeError(f"{name} is an older name of {present}: pass one of them")
+            kwargs[present] = kwargs.pop(name)
+        return function(*args, **kwargs)
+
+    return inside
+
+
+def made(kind: Callable[..., T], found: object) -> T:
+    """A result of the compiled part, whose names are those of the members."""
+    assert isinstance(found, dict)
+    return kind(**found)
 
 
 class Arrays(Mapping[str, NDArray[Any]]):
@@ -73,7 +115,7 @@ def whole_number(name: str, value: Any) -> int:
             return operator.index(value)
     except TypeError:
         pass
-    raise ValueError(f"{name} must be a whole number, got {shown(value)}")
+    raise TypeError(f"{name} must be a whole number, got {shown(value)}")
 
 
 def read_seeds(name: str, value: Any, arms: int) -> list[int | None]:
@@ -98,7 +140,7 @@ def read_seeds(name: str, value: Any, arms: int) -> list[int | None]:
 
 def flag(name: str, value: Any) -> bool:
     if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{name} must be True or False, got {shown(value)}")
+        raise TypeError(f"{name} must be True or False, got {shown(value)}")
     return bool(value)
 
 
@@ -120,7 +162,7 @@ def number(name: str, value: Any) -> float:
     except OverflowError:
         raise ValueError(f"{name} must be finite, got a number that no double holds") from None
     except (TypeError, ValueError):
-        raise ValueError(f"{name} must be a number, got {shown(value)}") from None
+        raise TypeError(f"{name} must be a number, got {shown(value)}") from None
 
 
 def numbers(value: Any) -> Floats:
@@ -134,7 +176,7 @@ def path(name: str, value: str | os.PathLike[str]) -> Path:
     try:
         found = Path(value)
     except TypeError:
-        raise ValueError(f"{name} must be a path, got {shown(value)}") from None
+        raise TypeError(f"{name} must be a path, got {shown(value)}") from None
     if "\0" in str(found):
         raise ValueError(f"{name} must be a path, got {shown(value)}")
     return found

@@ -8,7 +8,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from . import dynamics
-from ._fields import Floats, number, shown
+from ._fields import Floats, Method, number, shown
 from ._native import Arm, Batch, end_effector
 
 Observation = NDArray[np.float32]
@@ -22,6 +22,12 @@ TIMESTEP = 0.005
 episode."""
 
 MOST_SUBSTEPS = 10_000
+
+UP = 0.95
+"""Least height of the end effector of an arm that is up, relative to its reach."""
+
+HOLD = 5.0
+"""Time for which an underactuated arm must stay up [s]."""
 
 FASTEST = 25.0
 """Joint rate [rad/s] at which an arm counts as lost."""
@@ -40,12 +46,14 @@ class Task:
 
     strength: ClassVar[float]
     """Efforts of an action of 1, relative to the efforts that hold the stretched arm."""
+    driven: ClassVar[slice] = slice(None)
+    """The joints that have a motor."""
     most_steps: ClassVar[int]
     """Default number of steps after which an episode is truncated."""
 
-    def __init__(self, arms: int, links: int, threads: int | None, method: str, timestep: float) -> None:
+    def __init__(self, arms: int, links: int, threads: int | None, method: Method, timestep: float) -> None:
         if not isinstance(method, str):
-            raise ValueError(f"method must be the name of a method, got {shown(method)}")
+            raise TypeError(f"method must be the name of a method, got {shown(method)}")
         self.substeps = _substeps(number("timestep", timestep))
         self.batch = Batch(arms, links, threads=threads)
         self.batch.set_integrator(method, STEP / self.substeps)
@@ -53,8 +61,10 @@ class Task:
         self.links = links
         self.reach = arm.reach
         self.lengths = arm.lengths
-        self.efforts = self.strength * dynamics.gravity_load(arm, np.zeros(links))
-        self.action_space = spaces.Box(-1.0, 1.0, (links,), np.float32)
+        self.efforts = np.zeros(links)
+        self.efforts[self.driven] = self.strength * dynamics.gravity_load(arm, np.zeros(links))[self.driven]
+        self.batch.set_limits(self.efforts)
+        self.action_space = spaces.Box(-1.0, 1.0, (len(self.efforts[self.driven]),), np.float32)
         bounds = np.array([1.0] * (2 * links) + [FASTEST] * links + self.further_bounds(), np.float32)
         self.observation_space = spaces.Box(-bounds, bounds, dtype=np.float32)
 
@@ -75,12 +85,18 @@ class Task:
 
     def go_on(self, actions: Action) -> None:
         """Takes a step with every arm with its row of `actions`, (arms, links)."""
-        self.batch.step(self.substeps, np.clip(actions, -1.0, 1.0) * self.efforts)
+        efforts = np.zeros((self.batch.n_arms, self.links))
+        efforts[:, self.driven] = np.clip(actions, -1.0, 1.0) * self.efforts[self.driven]
+        self.batch.step(self.substeps, efforts)
 
     def observe(self) -> Observation:
         position, rate = self.batch.position, self.batch.velocity
         seen = [np.cos(position), np.sin(position), np.clip(rate, -FASTEST, FASTEST), *self.further()]
         return np.concatenate(seen, axis=1, dtype=np.float32, casting="same_kind")
+
+    def info(self) -> dict[str, NDArray[Any]]:
+        """Further results of a step, one per arm."""
+        return {}
 
     def goals(self) -> Floats:
         """The point with the highest reward of the end effector, one row per arm."""
@@ -106,6 +122,39 @@ class SwingUp(Task):
 
     def goals(self) -> Floats:
         return np.tile([0.0, self.reach], (self.batch.n_arms, 1))
+
+
+class Underactuated(SwingUp):
+    """A swing-up in which not every joint has a motor, with the time for which the arm has been up."""
+
+    most_steps = 2000
+
+    def __init__(self, arms: int, *settings: Any) -> None:
+        super().__init__(arms, *settings)
+        self.held = np.zeros(arms)
+
+    def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
+        super().begin(arms, random)
+        self.held[list(arms)] = 0.0
+
+    def go_on(self, actions: Action) -> None:
+        super().go_on(actions)
+        is_up = self.batch.end_effector[:, 1] >= UP * self.reach
+        self.held = np.where(is_up, self.held + STEP, 0.0)
+
+    def info(self) -> dict[str, NDArray[Any]]:
+        # Half of a step for the rounding of the sum.
+        return {"held": self.held.copy(), "is_success": self.held > HOLD - STEP / 2}
+
+
+class Acrobot(Underactuated):
+    strength = 4.0
+    driven = slice(1, None)
+
+
+class Pendubot(Underactuated):
+    strength = 1.0
+    driven = slice(0, 1)
 
 
 class Reach(Task):

@@ -1,5 +1,6 @@
 """Environments for Gymnasium, which this module's import registers: ``gymnasium.make("Pendularm-v0")``, and for many
-arms ``gymnasium.make_vec("Pendularm-v0", num_envs=1024)``; `PendularmReach-v0` likewise.
+arms ``gymnasium.make_vec("Pendularm-v0", num_envs=1024)``; `PendularmReach-v0`,
+`PendularmAcrobot-v0` and `PendularmPendubot-v0` likewise.
 
 The vector environments use a `Batch`. Each of their arms is bit-identical to the single environment, and has its own
 random stream. Under the seed `s`, arm `i` is the single environment under `s + i`, for any number of arms. They
@@ -23,13 +24,17 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ._fields import Floats, as_array, promised, read_seeds, shown, whole_number
+from ._fields import Floats, Method, as_array, promised, read_seeds, shown, whole_number
 from ._native import is_masked
 from ._render import METADATA, Frame, Renderer
-from ._tasks import TIMESTEP, Action, Observation, Reach, SwingUp, Task
+from ._tasks import TIMESTEP, Acrobot, Action, Observation, Pendubot, Reach, SwingUp, Task
 
 __all__ = [
+    "PendularmAcrobotEnv",
+    "PendularmAcrobotVectorEnv",
     "PendularmEnv",
+    "PendularmPendubotEnv",
+    "PendularmPendubotVectorEnv",
     "PendularmReachEnv",
     "PendularmReachVectorEnv",
     "PendularmVectorEnv",
@@ -53,9 +58,9 @@ def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
     return array
 
 
-def _named(refusal: ValueError, theirs: str, ours: str) -> ValueError:
+def _named(refusal: Exception, theirs: str, ours: str) -> Exception:
     """Renames the field in a refusal of the batch to the caller's name."""
-    return ValueError(str(refusal).replace(theirs, ours, 1))
+    return type(refusal)(str(refusal).replace(theirs, ours, 1))
 
 
 def _need_reset(call: str, has_begun: bool) -> None:
@@ -97,7 +102,7 @@ class _Single(_States, gymnasium.Env[Observation, Action]):
     def __init__(
         self,
         links: int = 2,
-        method: str = "rk4",
+        method: Method = "rk4",
         timestep: float = TIMESTEP,
         render_mode: str | None = None,
     ) -> None:
@@ -124,10 +129,11 @@ class _Single(_States, gymnasium.Env[Observation, Action]):
         action = _checked("action", action, self.action_space)
         try:
             self._task.go_on(action[None])
-        except ValueError as refusal:
+        except (TypeError, ValueError) as refusal:
             raise _named(refusal, "effort[0]", "action") from None
         self._picture.update(np.zeros(1, np.bool_))
-        return self._task.observe()[0], float(self._task.reward()[0]), bool(self._task.lost()[0]), False, {}
+        info = {name: values[0].item() for name, values in self._task.info().items()}
+        return self._task.observe()[0], float(self._task.reward()[0]), bool(self._task.lost()[0]), False, info
 
     def render(self) -> Frame | None:
         _need_reset("render", self._has_begun)
@@ -152,7 +158,7 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
         links: int = 2,
         max_episode_steps: int | None = None,
         threads: int | None = None,
-        method: str = "rk4",
+        method: Method = "rk4",
         timestep: float = TIMESTEP,
         render_mode: str | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
@@ -164,7 +170,7 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
             raise ValueError(f"max_episode_steps must be at least 1, or -1 for no limit, got {shown(most_steps)}")
         try:
             self._task = self.task_of(num_envs, links, threads, method, timestep)
-        except ValueError as refusal:
+        except (TypeError, ValueError) as refusal:
             raise _named(refusal, "n_arms", "num_envs") from None
         # The largest number means no limit in practice.
         self._most_steps = sys.maxsize if most_steps == -1 else min(most_steps, sys.maxsize)
@@ -208,7 +214,7 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
     ) -> tuple[Observation, dict[str, Any]]:
         mask = np.ones(self.num_envs, np.bool_)
         if not isinstance(options, Mapping | None):
-            raise ValueError(f"options must be a dict or None, got {shown(options)}")
+            raise TypeError(f"options must be a dict or None, got {shown(options)}")
         if options and "reset_mask" in options:
             given = options["reset_mask"]
             if is_masked(given):
@@ -244,10 +250,10 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
         actions = np.where(again[:, None], 0, _checked("actions", actions, self.action_space))
         try:
             self._task.go_on(actions)
-        except ValueError as refusal:
+        except (TypeError, ValueError) as refusal:
             raise _named(refusal, "effort", "actions") from None
         self._elapsed += 1
-        rewards, lost = self._task.reward(), self._task.lost()
+        rewards, lost, info = self._task.reward(), self._task.lost(), self._infos()
         if again.any():
             self._begin(again)
             rewards[again] = 0.0
@@ -256,14 +262,22 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
         self._ended = lost | truncated
         if self._mode != AutoresetMode.SAME_STEP or not self._ended.any():
             self._picture.update(again)
-            return self._task.observe(), rewards, lost, truncated, {}
+            return self._task.observe(), rewards, lost, truncated, self._infos()
         again, last = self._ended, np.full(self.num_envs, None, object)
         for arm, observation in enumerate(self._task.observe()):
             last[arm] = observation if again[arm] else None
         self._begin(again)
         self._picture.update(again)
-        infos = {"final_obs": last, "_final_obs": again, "final_info": {}, "_final_info": again.copy()}
+        ends = {name: values & again if name.startswith("_") else values for name, values in info.items()}
+        infos = {"final_obs": last, "_final_obs": again, "final_info": ends, "_final_info": again.copy(), **self._infos()}
         return self._task.observe(), rewards, lost, truncated, infos
+
+    def _infos(self) -> dict[str, Any]:
+        """The infos of all arms, as Gymnasium's vector environments have them: values, and which arms have one."""
+        infos: dict[str, Any] = {}
+        for name, values in self._task.info().items():
+            infos |= {name: values, f"_{name}": np.ones(self.num_envs, np.bool_)}
+        return infos
 
     def render(self) -> tuple[Frame, ...] | None:
         """A frame for each arm."""
@@ -368,6 +382,35 @@ _REACH = """The task: the end effector moves to a target and stays there. Each e
     """ + _arguments_and_rendering("the one observed")
 
 
+_UNDERACTUATED = """The task: a hanging arm swings up and stays up for 5 s. Only {driven}.
+
+    ## Action
+    ({shape},), from -1 to 1: the effort at {joint}, for 0.05 s. 1 is {strength} effort that holds the stretched
+    arm: {effort} N m for 2 links. The other motors have an effort limit of 0.
+
+    ## Observation
+    | index (2 links) | meaning | bounds | unit |
+    | --- | --- | --- | --- |
+    | 0, 1 | cosines of the joint angles | -1, 1 | |
+    | 2, 3 | sines of the joint angles | -1, 1 | |
+    | 4, 5 | joint rates | -25, 25 | rad/s |
+
+    Angles are counter-clockwise, the first from +x, the others from the link before; gravity is along -y.
+
+    ## Reward
+    `(1 + y / reach) / 2` with the height y of the end effector: 0 hanging, 1 upright.
+
+    ## Information
+    `held` is the time [s] for which the end effector has been above 0.95 of the reach. `is_success` is whether that is at
+    least 5 s.
+
+    ## Start and end
+    Hanging, each angle and rate off by up to 0.1 rad and 0.1 rad/s. Terminated when a joint turns faster than 25
+    rad/s; truncated after 2000 steps (100 s).
+
+    """ + _arguments_and_rendering("the highest point").replace("{", "{{").replace("}", "}}")
+
+
 class PendularmEnv(_Single):
     __doc__ = _SWING_UP
     task_of = SwingUp
@@ -388,7 +431,41 @@ class PendularmReachVectorEnv(_Vector):
     task_of = Reach
 
 
-_TASKS: dict[str, type[Task]] = {"Pendularm": SwingUp, "PendularmReach": Reach}
+_ACROBOT = _UNDERACTUATED.format(
+    driven="the elbow, and with 3 links the last joint, is driven", shape="links - 1", joint="each joint but the first",
+    strength="four times the", effort="19.62",
+)
+_PENDUBOT = _UNDERACTUATED.format(
+    driven="the shoulder is driven", shape="1", joint="the first joint", strength="the", effort="19.62",
+)
+
+
+class PendularmAcrobotEnv(_Single):
+    __doc__ = _ACROBOT
+    task_of = Acrobot
+
+
+class PendularmAcrobotVectorEnv(_Vector):
+    __doc__ = _ACROBOT
+    task_of = Acrobot
+
+
+class PendularmPendubotEnv(_Single):
+    __doc__ = _PENDUBOT
+    task_of = Pendubot
+
+
+class PendularmPendubotVectorEnv(_Vector):
+    __doc__ = _PENDUBOT
+    task_of = Pendubot
+
+
+_TASKS: dict[str, type[Task]] = {
+    "Pendularm": SwingUp,
+    "PendularmReach": Reach,
+    "PendularmAcrobot": Acrobot,
+    "PendularmPendubot": Pendubot,
+}
 for _name, _task in _TASKS.items():
     gymnasium.register(
         f"{_name}-v0",

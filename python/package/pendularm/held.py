@@ -1,17 +1,20 @@
 """The largest stable control period of any robot near a pose, from its mass matrix and its gains."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
 from . import _native
-from ._fields import Floats, shown, whole_number
+from ._fields import Floats, Method, made, shown, whole_number
 from ._native import as_doubles, is_masked
 
 __all__ = ["HeldLimit", "HeldMode", "held_limit"]
 
 _MOST_JOINTS = 64
+
+Between = Literal["exact", "semi_implicit", "implicit"] | Method
+"""The motion between two runs of the law."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,23 +35,24 @@ class HeldMode:
 
 @dataclass(frozen=True, eq=False)
 class HeldLimit:
-    """Limits of a sampled loop. `None` means that none was found, and a limit of 0 that a mode grows at every period."""
+    """Limits of a sampled loop. `inf` means that there is none, 0 that a mode grows at every period, and `nan` that a value is
+    not known."""
 
-    period_limit: float | None
+    period_limit: float
     """The largest control period up to which no mode grows [s], at the same number of steps in a period."""
     critical: HeldMode | None
     """The motion that grows just beyond it."""
     effective_inertia: Floats
     """The inertia that each joint moves while the others are free [kg m²], (joints,)."""
     stable: bool | None
-    """Whether no mode grows at the given `period`; this and the following are `None` without one."""
-    growth_per_period: float | None
+    """Whether no mode grows at the given `period`. Without one this is `None`, and the following are `nan`."""
+    growth_per_period: float
     """Factor by which the fastest growing mode grows in this period, or the slowest decaying one decays."""
-    timestep_limit: float | None
-    """The largest timestep at this period [s]; `None` for exact motion."""
-    kd_factor_limit: float | None
+    timestep_limit: float
+    """The largest timestep at this period [s]; `inf` for exact motion."""
+    kd_factor_limit: float
     """The largest factor by which `kd` may be multiplied at this period."""
-    armature: float | None
+    armature: float
     """The least inertia that makes this period stable if it is added to each joint [kg m²]."""
     explanation: str
     """The result in words and numbers. Joints are counted from 0."""
@@ -61,8 +65,9 @@ def _rows(name: str, value: Any) -> list[list[float]]:
         if is_masked(value):
             raise ValueError
         array = as_doubles(value)
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} must be an array of numbers, got {shown(value)}") from None
+    except (TypeError, ValueError, OverflowError) as why:
+        kind = TypeError if isinstance(why, TypeError) else ValueError
+        raise kind(f"{name} must be an array of numbers, got {shown(value)}") from None
     if array.ndim > 2 or any(length > _MOST_JOINTS for length in array.shape):
         raise ValueError(f"{name} must have at most {_MOST_JOINTS} rows of numbers, got the shape {array.shape}")
     rows: list[list[float]] = (array.reshape(1, -1) if array.ndim < 2 else array).tolist()
@@ -89,7 +94,7 @@ def held_limit(
     stiffness: ArrayLike | None = None,
     period: float | None = None,
     delay: int = 0,
-    between: str = "exact",
+    between: Between = "exact",
     timestep: float | None = None,
     steps: int = 1,
 ) -> HeldLimit:
@@ -116,9 +121,9 @@ def held_limit(
         if not 0 <= number < 2**63:
             raise ValueError(f"{name} must be at least 0, got {shown(number)}")
     if not isinstance(between, str):
-        raise ValueError(f"between must be a name, got {shown(between)}")
+        raise TypeError(f"between must be a name, got {shown(between)}")
     matrices = {"M": M, "kp": kp, "kd": kd, "ki": ki, "damping": damping, "stiffness": stiffness}
     arguments: dict[str, Any] = {name: _rows(name, value) for name, value in matrices.items()}
     answer = _native.held_limit(arguments | numbers | {"period": length, "between": between})
     critical = answer["critical"]
-    return HeldLimit(**answer | {"critical": critical and HeldMode(**critical)})
+    return made(HeldLimit, answer | {"critical": None if critical is None else made(HeldMode, critical)})

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 import mujoco
 
 from ._fields import Floats
-from .held import HeldLimit, held_limit as _held_limit
+from .held import Between, HeldLimit, held_limit as _held_limit
 
 __all__ = ["held_limit", "matrices"]
 
@@ -73,7 +73,8 @@ def held_limit(
     damping, own_kp, own_kd = of["damping"], of["kp"], of["kd"]
     length = opt.timestep if period is None else period
     steps = max(1, round(length / opt.timestep)) if np.ndim(length) == 0 and length > 0 else 1
-    stiffness, between = of["stiffness"] + own_kp, "implicit"
+    stiffness = of["stiffness"] + own_kp
+    between: Between = "implicit"
     law: dict[str, Any] = {"kp": kp, "kd": kd, "ki": ki}
     if opt.integrator == kinds.mjINT_EULER:
         # Only the damping of joints is implicit, and the actuators' is not.

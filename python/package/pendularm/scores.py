@@ -82,8 +82,9 @@ def _parsed(file: Path) -> Mapping[str, object]:
 def _rows(actions: ArrayLike) -> Floats:
     try:
         rows = numbers(actions)
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"actions must be an array of numbers, or a policy, got {shown(actions)}") from None
+    except (TypeError, ValueError, OverflowError) as why:
+        kind = TypeError if isinstance(why, TypeError) else ValueError
+        raise kind(f"actions must be an array of numbers, or a policy, got {shown(actions)}") from None
     if rows.ndim != 2 or rows.shape[1] != 2 or not np.isfinite(rows).all():
         raise ValueError(f"actions must be finite, with the shape (steps, 2), got {shown(actions)}")
     return rows

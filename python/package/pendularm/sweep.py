@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._code import fingerprint
-from ._fields import Arrays, Floats, as_array, flag, number, path, promised, shown, whole_number
+from ._fields import Arrays, Floats, as_array, flag, number, path, present_name, promised, shown, whole_number
 from ._native import BUILD, Batch, is_masked
 from ._pieces import Folder, PieceResults, hand_out
-from ._settings import begin, column, try_values
+from ._settings import begin, column, present_values, try_values
 
 __all__ = ["Executor", "Metric", "Run", "Sweep", "sweep"]
 
@@ -140,9 +140,10 @@ def sweep(
 ) -> Sweep:
     """Runs an arm for every combination of the settings in `grid`, and returns the `metric` of each run.
 
-    Settings are `lengths` [m], `masses` [kg], `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad], `setpoint` [rad],
-    `q0` [rad] and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s],
-    `method`, `control_period` [s] and `control_delay`. `grid` has a sequence for each setting that varies. Others are
+    Settings are `lengths` [m], `masses` [kg], `viscous` [N m s/rad], `kp` [N m/rad], `ki` [N m/(rad s)], `kd`
+    [N m s/rad], `setpoint` [rad], `q` [rad], `qd` [rad/s], `effort_limit` [N m] and `encoder_step` [rad], a number for all
+    joints or one for each; `gravity` [m/s²], `timestep` [s], `method`, `control_period` [s], `control_delay`,
+    `anti_windup`, `tracking_time` [s] and `velocity_source`. `grid` has a sequence for each setting that varies. Others are
     keyword arguments, and a missing one has the value of a fresh runtime. Without `controller` the controller is off.
     Every run lasts `duration` [s], at least one timestep, rounded to the nearest number of timesteps. It has `samples`,
     including start and end.
@@ -158,16 +159,21 @@ def sweep(
     and if the folder has another sweep.
     """
     if not isinstance(grid, Mapping):
-        raise ValueError(f"grid must be a mapping from settings to their values, got {shown(grid)}")
+        raise TypeError(f"grid must be a mapping from settings to their values, got {shown(grid)}")
     axes = {}
     for name, values in grid.items():
         try:
             # The parts of a text would be characters or numbers.
             if isinstance(values, str | bytes | bytearray):
                 raise TypeError
-            axes[name] = list(islice(values, MOST_SETTINGS + 1))
+            name = present_name(name)
+            axes[name] = present_values(name, list(islice(values, MOST_SETTINGS + 1)))
         except TypeError:
-            raise ValueError(f"grid[{name!r}] must be a sequence of values, got {shown(values)}") from None
+            raise TypeError(f"grid[{name!r}] must be a sequence of values, got {shown(values)}") from None
+    for name in list(settings):
+        value = settings.pop(name)
+        name = present_name(name)
+        (settings[name],) = present_values(name, [value])
     for name, choices in axes.items():
         if name in settings:
             raise ValueError(f"{name} is both in the grid and fixed")
@@ -192,9 +198,10 @@ def sweep(
     if not (np.isfinite(duration) and duration > 0):
         raise ValueError(f"duration must be finite and greater than 0, got {duration}")
     if metric not in METRICS if isinstance(metric, str) else not callable(metric):
-        raise ValueError(f"metric must be one of {', '.join(METRICS)} or a function, got {metric!r}")
+        kind = ValueError if isinstance(metric, str) else TypeError
+        raise kind(f"metric must be one of {', '.join(METRICS)} or a function, got {metric!r}")
     if executor is not None and not callable(getattr(executor, "submit", None)):
-        raise ValueError(f"executor must have submit, as in concurrent.futures, got {shown(executor)}")
+        raise TypeError(f"executor must have submit, as in concurrent.futures, got {shown(executor)}")
     folder = None if folder is None else path("folder", folder)
     progress = flag("progress", progress)
     question = _Question(

@@ -2,13 +2,16 @@
 //!
 //! **Invariant:** a refusal names its field, as in `fields`.
 
+use std::fmt::Display;
+
 use numpy::{PyArray1, PyArrayMethods};
-use pendularm::math::integrator::Method;
+use pendularm::math::sensors::MAX_DELAY;
 use pyo3::prelude::{PyAnyMethods, PyErr, PyResult};
-use pyo3::types::{PyByteArray, PyBytes, PyDict};
+use pyo3::types::{PyBool, PyByteArray, PyBytes, PyDict, PyInt, PyString};
 
 use crate::arrays::{ArrayArgument, collected, laid_out, room};
-use crate::fields::{self, Object, is_masked, is_too_long, refused, shown};
+use crate::fields::{self, Name, Object, is_masked, is_too_long, refused, shown, wrong_type};
+use crate::robot::delay;
 
 /// The array, if there is an argument.
 pub(super) fn read<'py>(
@@ -39,60 +42,91 @@ fn one_or_each<T>(
     value: &Object<'_>,
     arms: usize,
     read: impl Fn(&Object<'_>) -> PyResult<Option<T>>,
-    expected: impl Fn() -> PyErr,
+    expected: impl Fn(&Object<'_>) -> PyErr,
 ) -> PyResult<Vec<T>> {
     if let Some(alike) = read(value)? {
         return Ok(vec![alike]);
     }
     let mut each = room(arms)?;
-    for one in entries(value, arms)?.ok_or_else(&expected)? {
-        each.push(read(&one)?.ok_or_else(&expected)?);
+    for one in entries(value, arms)?.ok_or_else(|| expected(value))? {
+        each.push(read(&one)?.ok_or_else(|| expected(&one))?);
     }
     Ok(each)
 }
 
+/// The refusal of an argument because of itself or one of its entries: a `ValueError` for a number out of range and a
+/// sequence with a wrong number of entries, else a `TypeError`.
+fn refusal(reason: &Object<'_>, why: impl Display) -> PyErr {
+    let is_text = reason.is_instance_of::<PyString>() || is_bytes(reason);
+    let is_sequence = reason.len().is_ok() && !is_text && !reason.is_instance_of::<PyDict>();
+    let is_number = reason.is_instance_of::<PyInt>() && !reason.is_instance_of::<PyBool>();
+    if is_sequence || is_number {
+        refused(why)
+    } else {
+        wrong_type(why)
+    }
+}
+
+/// For Python, bytes are a sequence of numbers.
+fn is_bytes(value: &Object<'_>) -> bool {
+    value.is_instance_of::<PyBytes>() || value.is_instance_of::<PyByteArray>()
+}
+
 /// One number of steps for all arms, or one for each.
 pub(super) fn read_steps(steps: &Object<'_>, arms: usize) -> PyResult<Vec<u64>> {
-    let expected = || {
-        refused(format_args!(
+    let expected = |reason: &Object<'_>| {
+        let why = format!(
             "steps must be a whole number, at least 0 and less than 2^64, or one for each of {arms} arms, got {}",
             shown(steps)
-        ))
+        );
+        refusal(reason, why)
     };
-    // For Python, bytes are a sequence of numbers.
-    let is_text = steps.is_instance_of::<PyBytes>() || steps.is_instance_of::<PyByteArray>();
-    if is_text || is_masked(steps)? {
-        return Err(expected());
+    if is_bytes(steps) || is_masked(steps)? {
+        return Err(expected(steps));
     }
     one_or_each(steps, arms, |one| Ok(fields::count(one)), expected)
 }
 
-/// One method for all arms, or one for each.
-pub(super) fn read_methods(method: &Object<'_>, arms: usize) -> PyResult<Vec<Method>> {
+/// One choice for all arms, or one for each, by their names. `choose` reads one.
+pub(super) fn read_names<T>(
+    field: &str,
+    value: Option<&Object<'_>>,
+    arms: usize,
+    choose: impl Fn(Name) -> PyResult<T>,
+) -> PyResult<Option<Vec<T>>> {
     let read = |one: &Object<'_>| {
         let name = one.extract::<String>().ok();
-        name.map(|name| fields::method("method", &name)).transpose()
+        name.map(|name| choose(Name::Is(name))).transpose()
     };
-    one_or_each(method, arms, read, || {
-        refused(format_args!(
-            "method must be a name, or one for each of {arms} arms, got {}",
-            shown(method)
-        ))
-    })
+    let all = |value: &Object<'_>| {
+        one_or_each(value, arms, read, |reason| {
+            let why = format!(
+                "{field} must be a name, or one for each of {arms} arms, got {}",
+                shown(value)
+            );
+            refusal(reason, why)
+        })
+    };
+    value.map(all).transpose()
 }
 
-/// One boolean for all arms, or one for each.
-pub(super) fn read_flags(field: &str, flag: &Object<'_>, arms: usize) -> PyResult<Vec<bool>> {
-    let expected = || {
-        refused(format_args!(
-            "{field} must be True or False, or one of them for each of {arms} arms, got {}",
-            shown(flag)
-        ))
+/// One delay for all arms, or one for each.
+pub(super) fn read_delays(value: &Object<'_>, arms: usize) -> PyResult<Vec<u8>> {
+    let expected = |reason: &Object<'_>| {
+        let why = format!(
+            "control_delay must be a whole number from 0 to {MAX_DELAY}, or one for each of {arms} arms, got {}",
+            shown(value)
+        );
+        refusal(reason, why)
     };
-    if is_masked(flag)? {
-        return Err(expected());
+    if is_bytes(value) || is_masked(value)? {
+        return Err(expected(value));
     }
-    one_or_each(flag, arms, |one| Ok(one.extract().ok()), expected)
+    let read = |one: &Object<'_>| {
+        let is_count = fields::count(one).is_some() || one.extract::<bool>().is_ok();
+        is_count.then(|| delay(one)).transpose()
+    };
+    one_or_each(value, arms, read, expected)
 }
 
 /// The value for an arm, from one for all or one for each.
@@ -115,11 +149,12 @@ pub(super) fn chosen(arms: Option<&Object<'_>>, count: usize) -> PyResult<Vec<us
         )));
     }
     let expected = || {
-        refused(format_args!(
+        let why = format!(
             "arms must be a mask of {count} booleans, or indices from 0 to {}, got {}",
             count - 1,
             shown(arms)
-        ))
+        );
+        refusal(arms, why)
     };
     if is_too_long(arms)? {
         return Err(expected());

@@ -6,7 +6,6 @@ use pyo3::prelude::PyResult;
 use rayon::prelude::*;
 
 use pendularm::math::arm::{Arm, State};
-use pendularm::math::count::in_f64;
 use pendularm::math::dynamics::energy;
 use pendularm::math::kinematics::forward;
 use pendularm::math::pid::Gains;
@@ -59,7 +58,7 @@ impl Shown<'_> {
 pub(crate) struct Piece<'a> {
     /// The number of steps of every lane, or one per lane.
     pub(crate) steps: &'a [u64],
-    /// Effort that is added in all these steps, in place of a lane's disturbance.
+    /// Effort that is applied in all these steps, in place of the controller's.
     pub(crate) effort: Option<&'a Rows<'a>>,
     /// The number of steps already taken, and of those taken now.
     pub(crate) done: u64,
@@ -110,42 +109,30 @@ impl Piece<'_> {
     fn take<const N: usize>(&self, first: usize, lanes: &mut [Simulation<N>], shown: Shown<'_>) {
         // This may be a thread of the pool.
         let _floats = Promised::begin();
-        if self.done == 0
-            && let Some(effort) = self.effort
-        {
-            for (index, lane) in lanes.iter_mut().enumerate() {
-                let steps = of_arm(self.steps, first + index).unwrap_or(0);
-                if steps > 0 {
-                    let duration = in_f64(steps) * lane.timestep();
-                    lane.disturb(effort.row(first + index), duration);
-                }
-            }
-        }
-        batch::advance(lanes.iter_mut().enumerate().map(|(index, lane)| {
-            let steps = of_arm(self.steps, first + index).unwrap_or(0);
-            let left = steps.saturating_sub(self.done);
-            (lane, left.min(self.length))
-        }));
-        if self.effort.is_some() {
-            let diverged = lanes.iter_mut().filter(|lane| lane.divergence().is_some());
-            diverged.for_each(end_disturbance);
-        }
+        self.drive(first, lanes, true);
+        let each = lanes.iter_mut().enumerate();
+        batch::advance(each.map(|(index, lane)| (lane, self.left(first + index))));
+        self.drive(first, lanes, false);
         shown.show(lanes);
     }
-}
 
-/// Ends the effort of interrupted steps.
-pub(crate) fn end_effort<const N: usize>(lanes: &mut [Simulation<N>], steps: &[u64]) {
-    for (index, lane) in lanes.iter_mut().enumerate() {
-        if of_arm(steps, index).unwrap_or(0) > 0 {
-            end_disturbance(lane);
+    /// Begins or ends the effort in the lanes that take steps.
+    fn drive<const N: usize>(&self, first: usize, lanes: &mut [Simulation<N>], begins: bool) {
+        let Some(effort) = self.effort else {
+            return;
+        };
+        for (index, lane) in lanes.iter_mut().enumerate() {
+            if self.left(first + index) > 0 {
+                lane.drive(begins.then(|| effort.row(first + index)));
+            }
         }
     }
-}
 
-/// Replaces the lane's disturbance. Adding negative zero changes no number.
-fn end_disturbance<const N: usize>(lane: &mut Simulation<N>) {
-    lane.disturb([-0.0; N], lane.timestep());
+    /// The number of steps of a lane in this piece.
+    fn left(&self, lane: usize) -> u64 {
+        let steps = of_arm(self.steps, lane).unwrap_or(0);
+        steps.saturating_sub(self.done).min(self.length)
+    }
 }
 
 /// Kinetic plus potential energy of every lane \[J\].

@@ -17,17 +17,20 @@ use std::thread::available_parallelism;
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pendularm::math::arm::{Arm, State};
+use pendularm::math::limits::Limits;
 use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::sensors::Sensors;
 use pendularm::math::simulation::{ControlPeriod, Simulation};
 use pyo3::prelude::{Py, PyAny, PyDictMethods, PyResult, Python, pyclass, pymethods};
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::arm::{Either, for_either};
 use crate::arrays::{ArrayArgument, Rows, read_only};
-use crate::fields::{self, Bound, Flag, Held, Object, Whole, refused};
+use crate::fields::{self, Bound, Flag, Held, Object, Whole, refused, renamed, required};
 use crate::patience::{Turns, hold};
+use crate::robot::{self, limited};
 use crate::state;
-use given::{chosen, of_arm, read, read_flags, read_methods, read_steps};
+use given::{chosen, of_arm, read, read_delays, read_names, read_steps};
 use lanes::Piece;
 use pool::pool;
 use windows::Windows;
@@ -43,8 +46,10 @@ const MOST_THREADS: usize = 1024;
 
 /// Many arms, advanced in whole steps. Each is bit-identical to a `Simulation`, for any number of threads.
 ///
-/// All start as in a fresh runtime. `position`, `velocity`, `effort`, `time` and `diverged` are read-only arrays,
-/// created once and overwritten by every call that changes the arms. Copy values that you need later. An array
+/// `position`, `velocity`, `effort`, `time` and `diverged` are read-only arrays, created once and overwritten by every
+/// call that changes the arms. Copy values that you need later.
+///
+/// All arms start as in a fresh runtime. An array
 /// argument has one row per arm, (`n_arms`, links), or one for all, (links,) or (1, links). Contiguous, writable doubles are read
 /// without a copy. `threads` share the work: by default one per core, or fewer if the system refuses some. With 1 the
 /// caller's thread does the work. Calls that change one batch from several threads wait for each other. The arrays
@@ -138,8 +143,9 @@ impl Batch {
     }
 
     /// Takes `steps` steps (1 by default) with every arm, or a whole number per arm, (`n_arms`,). A diverged arm
-    /// takes no more. `effort` [N m] is added to the controller's for all these steps, as `Simulation.disturb` does.
-    /// The interpreter's lock is released meanwhile. Ctrl-C ends the call between two steps, and the effort too.
+    /// takes no more. With an `effort` [N m], that effort is applied in these steps, within the limits of the motors, and
+    /// the controllers do not run, as in `Simulation.step`. The interpreter's lock is released meanwhile. Ctrl-C ends the
+    /// call between two steps, and the effort too.
     #[pyo3(signature = (steps=None, effort=None))]
     fn step(
         &self,
@@ -162,13 +168,21 @@ impl Batch {
             is_shared: pool.is_some(),
         };
         let _turn = self.turns.take(py)?;
-        let taken = for_either!(&self.own, lanes => {
+        for_either!(&self.own, lanes => {
             stepping::take(py, lanes, &self.windows, pool.as_deref(), first)
-        });
-        if taken.is_err() && effort.is_some() {
-            for_either!(&self.own, lanes => lanes::end_effort(&mut hold(py, lanes), &steps));
-        }
-        taken
+        })
+    }
+
+    /// Adds `effort` [N m] to the controllers' in every step that begins within `duration` [s] from now, a number or
+    /// (`n_arms`,), as `Simulation.disturb`.
+    fn disturb(&self, py: Python<'_>, effort: &Object<'_>, duration: &Object<'_>) -> PyResult<()> {
+        let effort = ArrayArgument::read("effort", effort)?;
+        let effort = effort.rows(Some(self.arms), self.links(), Bound::Finite)?;
+        let duration = ArrayArgument::read("duration", duration)?;
+        let duration = duration.column(self.arms, Bound::Positive)?;
+        for_each_arm!(self, py, (row, one) => {
+            one.disturb(effort.row(row), duration.number(row));
+        })
     }
 
     /// Returns to the starting pose at rest, at time 0, as `Simulation.reset`: all arms, those of a mask
@@ -185,19 +199,26 @@ impl Batch {
         })
     }
 
-    /// Sets the states of arms: `position` [rad] and `velocity` [rad/s] (zeros by default), one row per arm or one
+    /// Sets the states of arms: positions `q` [rad] and rates `qd` [rad/s] (zeros by default), one row per arm or one
     /// for all. `arms` selects them as in `reset`. Clocks and controllers do not change. With the bytes of `get_state`
-    /// in place of the position, everything of all arms is set.
-    #[pyo3(signature = (position, velocity=None, arms=None))]
+    /// in place of `q`, everything of all arms is set.
+    #[pyo3(
+        signature = (q=None, qd=None, arms=None, *, position=None, velocity=None),
+        text_signature = "($self, q, qd=None, arms=None)"
+    )]
     fn set_state(
         &self,
         py: Python<'_>,
-        position: &Object<'_>,
-        velocity: Option<&Object<'_>>,
+        q: Option<&Object<'_>>,
+        qd: Option<&Object<'_>>,
         arms: Option<&Object<'_>>,
+        position: Option<&Object<'_>>,
+        velocity: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        if let Ok(state) = position.cast::<PyBytes>() {
-            let further = velocity.or(arms);
+        let q = required("q", q, "position", position)?;
+        let qd = renamed("qd", qd, "velocity", velocity)?;
+        if let Ok(state) = q.cast::<PyBytes>() {
+            let further = qd.as_ref().or(arms);
             let _turn = self.turns.take(py)?;
             return for_either!(&self.own, lanes => {
                 let read = state::read(state, self.arms, further)?;
@@ -210,10 +231,10 @@ impl Batch {
             });
         }
         let chosen = chosen(arms, self.arms)?;
-        let position = ArrayArgument::read("position", position)?;
-        let position = position.rows(Some(chosen.len()), self.links(), Bound::Finite)?;
-        let velocity = read("velocity", velocity)?;
-        let velocity = velocity
+        let q = ArrayArgument::read("q", &q)?;
+        let q = q.rows(Some(chosen.len()), self.links(), Bound::Finite)?;
+        let qd = read("qd", qd.as_ref())?;
+        let qd = qd
             .as_ref()
             .map(|given| given.rows(Some(chosen.len()), self.links(), Bound::Finite))
             .transpose()?;
@@ -221,8 +242,8 @@ impl Batch {
             for (row, &lane) in chosen.iter().enumerate() {
                 if let Some(one) = lanes.get_mut(lane) {
                     one.set_state(State {
-                        position: position.row(row),
-                        velocity: velocity.as_ref().map_or([0.0; _], |velocity| velocity.row(row)),
+                        position: q.row(row),
+                        velocity: qd.as_ref().map_or([0.0; _], |qd| qd.row(row)),
                     });
                 }
             }
@@ -248,25 +269,32 @@ impl Batch {
     }
 
     fn __setstate__(&self, py: Python<'_>, state: &Object<'_>) -> PyResult<()> {
-        self.set_state(py, state, None, None)
+        self.set_state(py, Some(state), None, None, None, None)
     }
 
-    /// Sets the setpoints: `positions` [rad] and `velocities` [rad/s] (zeros by default).
-    #[pyo3(signature = (positions, velocities=None))]
+    /// Sets the setpoints: positions `q` [rad] and rates `qd` [rad/s] (zeros by default).
+    #[pyo3(
+        signature = (q=None, qd=None, *, positions=None, velocities=None),
+        text_signature = "($self, q, qd=None)"
+    )]
     fn set_setpoint(
         &self,
         py: Python<'_>,
-        positions: &Object<'_>,
+        q: Option<&Object<'_>>,
+        qd: Option<&Object<'_>>,
+        positions: Option<&Object<'_>>,
         velocities: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        let positions = ArrayArgument::read("positions", positions)?;
-        let positions = positions.rows(Some(self.arms), self.links(), Bound::Finite)?;
-        let velocities = read("velocities", velocities)?;
-        let velocities = self.rows(velocities.as_ref(), Bound::Finite)?;
+        let q = required("q", q, "positions", positions)?;
+        let qd = renamed("qd", qd, "velocities", velocities)?;
+        let q = ArrayArgument::read("q", &q)?;
+        let q = q.rows(Some(self.arms), self.links(), Bound::Finite)?;
+        let qd = read("qd", qd.as_ref())?;
+        let qd = self.rows(qd.as_ref(), Bound::Finite)?;
         for_each_arm!(self, py, (row, one) => {
             one.set_setpoint(Setpoint {
-                position: positions.row(row),
-                velocity: velocities.as_ref().map_or([0.0; _], |velocities| velocities.row(row)),
+                position: q.row(row),
+                velocity: qd.as_ref().map_or([0.0; _], |qd| qd.row(row)),
             });
         })
     }
@@ -294,23 +322,23 @@ impl Batch {
         })
     }
 
-    /// Changes the given parameters: `gravity` [m/s²], a number or (`n_arms`,), `masses` [kg] and `lengths` [m].
-    #[pyo3(signature = (gravity=None, masses=None, lengths=None))]
+    /// Changes the given parameters: `gravity` [m/s²], a number or (`n_arms`,), `masses` [kg], `lengths` [m], and the
+    /// friction `viscous` [N m s/rad].
+    #[pyo3(signature = (gravity=None, masses=None, lengths=None, viscous=None))]
     fn set_params(
         &self,
         py: Python<'_>,
         gravity: Option<&Object<'_>>,
         masses: Option<&Object<'_>>,
         lengths: Option<&Object<'_>>,
+        viscous: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        let (gravity, masses, lengths) = (
-            read("gravity", gravity)?,
-            read("masses", masses)?,
-            read("lengths", lengths)?,
-        );
+        let (gravity, masses) = (read("gravity", gravity)?, read("masses", masses)?);
+        let (lengths, viscous) = (read("lengths", lengths)?, read("viscous", viscous)?);
         let gravity = self.column(gravity.as_ref(), Bound::NotNegative)?;
         let masses = self.rows(masses.as_ref(), Bound::Positive)?;
         let lengths = self.rows(lengths.as_ref(), Bound::Positive)?;
+        let viscous = self.rows(viscous.as_ref(), Bound::NotNegative)?;
         for_each_arm!(self, py, (row, one) => {
             let present = one.arm();
             let arm = Arm::new(
@@ -318,6 +346,8 @@ impl Batch {
                 masses.as_ref().map_or(*present.masses(), |given| given.row(row)),
                 gravity.as_ref().map_or(present.gravity(), |given| given.number(row)),
             );
+            let friction = viscous.as_ref().map_or(*present.viscous(), |given| given.row(row));
+            let arm = arm.and_then(|arm| arm.with_friction(friction));
             one.set_arm(arm.map_err(refused)?);
         })
     }
@@ -330,9 +360,7 @@ impl Batch {
         method: Option<&Object<'_>>,
         timestep: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        let methods = method
-            .map(|method| read_methods(method, self.arms))
-            .transpose()?;
+        let methods = read_names("method", method, self.arms, |name| name.method("method"))?;
         let timestep = read("timestep", timestep)?;
         let timestep = self.column(timestep.as_ref(), Bound::Positive)?;
         for_each_arm!(self, py, (row, one) => {
@@ -344,8 +372,8 @@ impl Batch {
         })
     }
 
-    /// Changes the given values: `control_period` [s], a number or (`n_arms`,), 0 for every step, and `control_delay`,
-    /// one boolean or one per arm. As `Simulation.control_period` and `Simulation.control_delay`.
+    /// Changes the given values: `control_period` [s], a number or (`n_arms`,), 0 for every step, and `control_delay`
+    /// [control periods], one whole number or one per arm. As `Simulation.control_period` and `Simulation.control_delay`.
     #[pyo3(signature = (control_period=None, control_delay=None))]
     fn set_control_period(
         &self,
@@ -354,7 +382,7 @@ impl Batch {
         control_delay: Option<&Object<'_>>,
     ) -> PyResult<()> {
         let delays = control_delay
-            .map(|delay| read_flags("control_delay", delay, self.arms))
+            .map(|delay| read_delays(delay, self.arms))
             .transpose()?;
         let periods = read("control_period", control_period)?;
         let periods = self.column(periods.as_ref(), Bound::NotNegative)?;
@@ -363,7 +391,58 @@ impl Batch {
             let delay = delays.as_deref().and_then(|delays| of_arm(delays, row));
             one.set_control_period(ControlPeriod {
                 period: periods.as_ref().map_or(present.period, |periods| periods.number(row)),
-                delay: delay.map_or(present.delay, u8::from),
+                delay: delay.unwrap_or(present.delay),
+            });
+        })
+    }
+
+    /// Changes the given values: `effort_limit` [N m], `inf` for no limit and 0 for no motor; `anti_windup`, a name or one
+    /// per arm, and `tracking_time` [s], a number or (`n_arms`,). As in `Simulation`.
+    #[pyo3(signature = (effort_limit=None, anti_windup=None, tracking_time=None))]
+    fn set_limits(
+        &self,
+        py: Python<'_>,
+        effort_limit: Option<&Object<'_>>,
+        anti_windup: Option<&Object<'_>>,
+        tracking_time: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        let (efforts, times) = (
+            read("effort_limit", effort_limit)?,
+            read("tracking_time", tracking_time)?,
+        );
+        let efforts = self.rows(efforts.as_ref(), Bound::Limit)?;
+        let times = self.column(times.as_ref(), Bound::Positive)?;
+        let forms = read_names("anti_windup", anti_windup, self.arms, robot::anti_windup)?;
+        for_each_arm!(self, py, (row, one) => {
+            let present = *one.limits();
+            let form = forms.as_deref().and_then(|forms| of_arm(forms, row));
+            one.set_limits(Limits {
+                effort: efforts.as_ref().map_or(present.effort, |given| limited(given.row(row))),
+                anti_windup: form.unwrap_or(present.anti_windup),
+                tracking_time: times.as_ref().map_or(present.tracking_time, |times| times.number(row)),
+            });
+        })
+    }
+
+    /// Changes the given sensors of the controllers: `encoder_step` [rad], 0 for exact positions, and `velocity_source`,
+    /// a name or one per arm. As in `Simulation`.
+    #[pyo3(signature = (encoder_step=None, velocity_source=None))]
+    fn set_sensors(
+        &self,
+        py: Python<'_>,
+        encoder_step: Option<&Object<'_>>,
+        velocity_source: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        let steps = read("encoder_step", encoder_step)?;
+        let steps = self.rows(steps.as_ref(), Bound::NotNegative)?;
+        let choose = robot::velocity_source;
+        let sources = read_names("velocity_source", velocity_source, self.arms, choose)?;
+        for_each_arm!(self, py, (row, one) => {
+            let present = *one.sensors();
+            let source = sources.as_deref().and_then(|sources| of_arm(sources, row));
+            one.set_sensors(Sensors {
+                encoder_step: steps.as_ref().map_or(present.encoder_step, |steps| steps.row(row)),
+                velocity: source.unwrap_or(present.velocity),
             });
         })
     }
@@ -395,31 +474,32 @@ impl Batch {
         self.threads
     }
 
-    /// Joint positions [rad], (`n_arms`, links), never wrapped; overwritten by the next call.
+    /// Overwritten by the next call: copy it to keep it. Joint positions q [rad], (`n_arms`, links), never wrapped.
     #[getter]
     fn position(&self, py: Python<'_>) -> Py<PyAny> {
         self.windows.position.view.clone_ref(py)
     }
 
-    /// Joint rates [rad/s], (`n_arms`, links); overwritten by the next call.
+    /// Overwritten by the next call: copy it to keep it. Joint rates qd [rad/s], (`n_arms`, links).
     #[getter]
     fn velocity(&self, py: Python<'_>) -> Py<PyAny> {
         self.windows.velocity.view.clone_ref(py)
     }
 
-    /// Efforts of the latest step [N m], (`n_arms`, links); overwritten by the next call.
+    /// Overwritten by the next call: copy it to keep it. Efforts of the latest step [N m], (`n_arms`, links).
     #[getter]
     fn effort(&self, py: Python<'_>) -> Py<PyAny> {
         self.windows.effort.view.clone_ref(py)
     }
 
-    /// Simulation times since the reset [s], (`n_arms`,); overwritten by the next call.
+    /// Overwritten by the next call: copy it to keep it. Simulation times since the reset [s], (`n_arms`,).
     #[getter]
     fn time(&self, py: Python<'_>) -> Py<PyAny> {
         self.windows.time.view.clone_ref(py)
     }
 
-    /// Whether each arm has diverged since its last `reset` or `set_state`, (`n_arms`,); overwritten by the next call.
+    /// Overwritten by the next call: copy it to keep it. Whether each arm has diverged since its last `reset` or
+    /// `set_state`, (`n_arms`,).
     #[getter]
     fn diverged(&self, py: Python<'_>) -> Py<PyAny> {
         self.windows.diverged.view.clone_ref(py)

@@ -442,7 +442,7 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// Changes the limits of the motors from the next step on. The integral and the control period go on. Each limit
-    /// must be finite and not negative, and the tracking time greater than 0.
+    /// must not be negative or NaN, and the tracking time must be greater than 0.
     pub fn set_limits(&mut self, limits: Limits<N>) {
         self.hold.set_limits(limits, self.timestep);
     }

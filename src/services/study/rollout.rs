@@ -26,7 +26,7 @@ use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::method::Given;
 use crate::study::paused::Paused;
 use crate::study::rollout::{
-    MAX_SAMPLES, Rollout, RolloutError, RolloutRequest, most_bytes, rollout_by,
+    Course, MAX_SAMPLES, Rollout, RolloutError, RolloutRequest, most_bytes, rollout_along,
 };
 
 // ---- question -------------------------------------------------------------------------------------------------------
@@ -146,7 +146,11 @@ impl<const N: usize> RolloutWork<N> {
                     (request.samples, request.reference) = (2, false);
                 }
                 let own = ask.tableau.map(|given| given.pair().clone());
-                rollout_by(request, own).await.map_err(Refused::Study)
+                let course = Course {
+                    own,
+                    ..Course::default()
+                };
+                rollout_along(request, course).await.map_err(Refused::Study)
             })
         };
         Self {
