@@ -7,13 +7,13 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 case ${BROWSER:=chromium} in
-chromium) needed=(chromium) packages=(chromium) ;;
-firefox) needed=(firefox-esr) packages=(firefox-esr) ;;
-webkit) needed=(WebKitWebDriver Xvfb) packages=(webkit2gtk-driver xvfb) ;;
+chromium) packages=(chromium); has() { command -v chromium; } ;;
+firefox) packages=(firefox-esr); has() { command -v firefox-esr || command -v firefox; } ;;
+webkit) packages=(webkit2gtk-driver xvfb); has() { command -v WebKitWebDriver && command -v Xvfb; } ;;
 *) echo "test-browser: BROWSER is chromium, firefox or webkit, not $BROWSER" >&2; exit 1 ;;
 esac
 export BROWSER
-if [ "$(command -v "${needed[@]}" | wc -l)" -lt ${#needed[@]} ]; then
+if ! has >/dev/null; then
     echo "test-browser: installing ${packages[*]}"
     apt-get update && apt-get install -y --no-install-recommends "${packages[@]}" || {
         echo "test-browser: $BROWSER cannot be had here, so the page is not tested in it: install ${packages[*]}" >&2

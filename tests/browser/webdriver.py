@@ -33,9 +33,9 @@ class Firefox:
     def __init__(self):
         self.profile = tempfile.mkdtemp(prefix="pendularm-browser-")
         pathlib.Path(self.profile, "user.js").write_text('user_pref("marionette.port", 0);\n')
-        self.started = [subprocess.Popen(
-            ["firefox-esr", "--headless", "--marionette", "--remote-allow-system-access", "--no-remote", "--profile", self.profile, "about:blank"],
-            start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)]
+        command = [shutil.which("firefox-esr") or "firefox", "--headless", "--marionette", "--remote-allow-system-access", "--no-remote"]
+        self.started = [subprocess.Popen([*command, "--profile", self.profile, "about:blank"], start_new_session=True, stdout=subprocess.DEVNULL,
+                                         stderr=subprocess.DEVNULL)]
         port, end = pathlib.Path(self.profile, "MarionetteActivePort"), time.monotonic() + ANSWER_SECONDS
         while not (port.exists() and port.read_text()) and time.monotonic() < end:
             time.sleep(0.1)
