@@ -320,6 +320,17 @@ fn a_used_server_is_not_accused_of_its_user() {
 }
 
 #[test]
+fn a_controller_that_stays_on_is_not_accused_of_its_integral() {
+    for says in ["cannot be disabled", "keeps the effort while paused"] {
+        let (program, planted) = (Runtime::start(), faults::all().into_iter().find(|planted| planted.says == says).unwrap());
+        let proxy = Proxy::start(&program.address.to_string(), planted.fault(2)).unwrap();
+        let rows = run(&proxy.address, &selected("enable"), |_, _| {}).unwrap().rows;
+        let causes: Vec<&String> = rows.iter().filter_map(|row| row.cause.as_ref()).collect();
+        assert!(rows.iter().any(Row::fails) && causes.is_empty(), "{says}: {causes:?}");
+    }
+}
+
+#[test]
 fn a_setting_that_the_server_does_not_take_back_is_told() {
     let mut calls = 0;
     let forgets = move |frame: &mut Value| {

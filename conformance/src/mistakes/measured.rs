@@ -10,7 +10,7 @@ use super::{Diagnosis, FLOOR, MEASURED_RATIO, NEAR, RATIO, distance, solution, v
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY, shifted};
 use crate::rules::goals;
-use crate::values::{largest, set};
+use crate::values::{largest, must, set};
 
 /// The time after `k` steps of `dt`, as a mistake has it.
 type Clock = fn(u32, f64) -> f64;
@@ -226,6 +226,7 @@ pub(super) fn of_law(bench: &mut Bench) -> Result<Diagnosis, String> {
     let least = 0.1 * KI * ERROR;
     let wound = largest(&end.effort).max(least);
     bench.enable(false)?;
+    must(largest(&bench.fresh()?.effort) == 0.0, || "a controller that stays on has no integral to clear".to_owned())?;
     bench.enable(true)?;
     got.push(kept(largest(&bench.fresh()?.effort) / wound));
     std::thread::sleep(Duration::from_millis(500));

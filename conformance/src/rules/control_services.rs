@@ -114,7 +114,7 @@ pub const CHECKS: &[Check] = &[
         bench.accepted(SET_INTEGRATOR, &json!({"timestep": 0.005}))?;
         bench.pause(true)?;
         let frozen = bench.fresh()?;
-        sleep(Duration::from_millis(700));
+        sleep(Duration::from_millis(400));
         let resumed = Instant::now();
         bench.pause(false)?;
         let after = bench.fresh()?;
@@ -173,7 +173,7 @@ pub const CHECKS: &[Check] = &[
         bench.stays_at(&pose, 0.2, 1e-6)
     }),
     ("reset-4", |bench| {
-        let before = wound_up(bench, 700)?;
+        let before = wound_up(bench, 500)?;
         bench.reset()?;
         let after = bench.fresh()?.effort;
         changes(&before, &after, |_, after| after.abs() < 0.01 * SMALL)

@@ -89,7 +89,7 @@ pub const CHECKS: &[Check] = &[
         rejects_gains(bench, &[bad])
     }),
     ("gains-6", |bench| {
-        let before = wound_up(bench, 1000)?;
+        let before = wound_up(bench, 500)?;
         bench.accepted(SET_GAINS, &json!({"ki": bench.each(2.0 * SMALL)}))?;
         let after = bench.fresh()?.effort;
         changes(&before, &after, |before, after| after > 1.6 * before)
@@ -152,9 +152,9 @@ pub const CHECKS: &[Check] = &[
     ("law-5", |bench| {
         let pose = bench.float(0.0, 1e-8, 0.0)?;
         bench.hold(&shifted(&pose, 1e8))?;
-        sleep(Duration::from_millis(400));
+        sleep(Duration::from_millis(300));
         let early = bench.fresh()?.effort;
-        sleep(Duration::from_millis(800));
+        sleep(Duration::from_millis(500));
         let late = bench.fresh()?.effort;
         changes(&early, &late, |early, late| early > 0.0 && (late / early - 1.0).abs() < 0.05)
     }),
