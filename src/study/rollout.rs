@@ -185,7 +185,7 @@ pub const fn most_bytes<const N: usize>() -> usize {
 pub async fn rollout<const N: usize>(
     request: RolloutRequest<N>,
 ) -> Result<Rollout<N>, RolloutError> {
-    rollout_by(request, None).await
+    recorded(request, request.control.simulation(request.start)).await
 }
 
 /// The same with a method of one's own, if there is one, in place of the loop's.
@@ -196,14 +196,24 @@ pub async fn rollout_by<const N: usize>(
     request: RolloutRequest<N>,
     own: Option<Pair>,
 ) -> Result<Rollout<N>, RolloutError> {
+    match own {
+        Some(pair) => {
+            let run = OwnRun::new(request.control, pair, request.start);
+            recorded(request, run).await
+        }
+        None => rollout(request).await,
+    }
+}
+
+/// The `run` of a request. A program without methods of one's own has no code of theirs.
+async fn recorded<const N: usize>(
+    request: RolloutRequest<N>,
+    mut run: impl Recorded<N>,
+) -> Result<Rollout<N>, RolloutError> {
     let RolloutRequest { control, start, .. } = request;
     let steps = request.steps()?;
     let samples = request.samples.min(steps + 1);
     let intervals = samples.saturating_sub(1).max(1);
-    let mut run: Box<dyn Recorded<N>> = match own {
-        Some(pair) => Box::new(OwnRun::new(control, pair, start)),
-        None => Box::new(control.simulation(start)),
-    };
     // On the heap, so that a run that has not begun has no memory for them.
     let references = |index| Reference::new(&control, start, index);
     let mut references: Option<Box<[Reference<N>; REFERENCES]>> = request
@@ -244,7 +254,7 @@ pub async fn rollout_by<const N: usize>(
         if run.divergence().is_some() {
             break;
         }
-        made.sample(&control.arm, &*run, references.as_deref(), ideals.as_ref());
+        made.sample(&control.arm, &run, references.as_deref(), ideals.as_ref());
     }
     made.steps = run.steps();
     made.evaluations = run.evaluations();
@@ -256,7 +266,7 @@ impl<const N: usize> Rollout<N> {
     fn sample(
         &mut self,
         arm: &Arm<N>,
-        run: &dyn Recorded<N>,
+        run: &impl Recorded<N>,
         references: Option<&[Reference<N>; REFERENCES]>,
         ideals: Option<&[Ideal<N>; 2]>,
     ) {
