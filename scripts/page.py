@@ -69,7 +69,8 @@ def main(module, notices, output):
         raise SystemExit(f"page.py: {notices} has the end of a comment")
     text = replaced(text, "</html>", f"</html>\n<!--\n{licences}-->")
     text = replaced(text, '"icon.svg"', f'"{icon}"')
-    text = replaced(text, '<link rel="stylesheet" href="style.css">', f"<style>\n{(PAGE / 'style.css').read_text()}</style>")
+    style = re.sub(r"/\*.*?\*/\s*", "", (PAGE / "style.css").read_text(), flags=re.S)
+    text = replaced(text, '<link rel="stylesheet" href="style.css">', f"<style>\n{style}</style>")
     text = replaced(text, '  <script type="module" src="main.js"></script>\n', "")
     carried = {"page-script": script.encode(), "kernel-module": pathlib.Path(module).read_bytes()}
     scripts = "".join(f'<script type="text/plain" id="{name}">{packed(data)}</script>\n' for name, data in carried.items())

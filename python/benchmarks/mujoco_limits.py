@@ -1,9 +1,9 @@
 """The predicted limit of the control period against the first one at which a push grows in MuJoCo itself.
 
 Each model has gravity and no constraints. A law of its own holds it at its first pose: kp and kd give each degree of
-freedom, on its effective inertia, 50 rad/s and a damping ratio of 1. A push of 1e-7 rad/s is watched for 3000 periods.
+freedom, on its effective inertia, 50 rad/s and a damping ratio of 1. A push of 1e-7 rad/s is watched for some thousand periods.
 
-    python mujoco_limits.py [--integrator implicitfast] [--steps 1] [--delay 0] FILE.xml ...
+    python mujoco_limits.py [--integrator implicitfast] [--steps 1] [--delay 0] [--periods 3000] FILE.xml ...
 
 Without files: the models of `dm_control` and `robosuite` that are installed.
 """
@@ -19,9 +19,6 @@ import numpy as np
 
 import pendularm.mujoco
 
-PERIODS = 3000
-
-
 def files():
     for package, pattern in (("dm_control", "suite/*.xml"), ("robosuite", "models/assets/robots/*/robot.xml")):
         spec = importlib.util.find_spec(package)
@@ -29,7 +26,7 @@ def files():
             yield from sorted(Path(spec.submodule_search_locations[0]).glob(pattern))
 
 
-def grows(model, period, steps, delay, law):
+def grows(model, period, steps, delay, law, periods):
     """Whether the push grows: the largest deviation of the last third is above that of the second."""
     data = mujoco.MjData(model)
     model.opt.timestep = period / steps
@@ -38,7 +35,7 @@ def grows(model, period, steps, delay, law):
     data.qvel[:] = 1e-7 * np.random.default_rng(1).normal(size=model.nv)
     efforts = [holding] * delay
     off, largest = np.zeros(model.nv), []
-    for _ in range(PERIODS):
+    for _ in range(periods):
         mujoco.mj_differentiatePos(model, off, 1.0, pose, data.qpos)
         efforts.append(holding - law["kp"] * off - law["kd"] * data.qvel)
         data.qfrc_applied[:] = efforts.pop(0)
@@ -47,7 +44,7 @@ def grows(model, period, steps, delay, law):
         largest.append(max(np.abs(off).max(), period * np.abs(data.qvel).max()))
         if not largest[-1] < 1e-3:
             return True
-    second, last = max(largest[PERIODS // 3 : 2 * PERIODS // 3]), max(largest[2 * PERIODS // 3 :])
+    second, last = max(largest[periods // 3 : 2 * periods // 3]), max(largest[2 * periods // 3 :])
     return last > max(second, 1e-11)
 
 
@@ -67,6 +64,7 @@ def main():
     parser.add_argument("--integrator", choices=["Euler", "implicitfast"], default="Euler")
     parser.add_argument("--steps", type=int, default=1)
     parser.add_argument("--delay", type=int, default=0)
+    parser.add_argument("--periods", type=int, default=3000)
     options = parser.parse_args()
     names = "mujoco", "dm_control", "robosuite"
     for name in names:
@@ -105,7 +103,7 @@ def main():
         if not limit:
             print(f"| {name} | {model.nv} | {'none' if limit is None else 'unstable at every period'} | | |", flush=True)
             continue
-        found = measured(model, limit, options.steps, options.delay, law)
+        found = measured(model, limit, options.steps, options.delay, law, options.periods)
         ratio = found / limit if found else float("nan")
         worst = max(worst, abs(ratio - 1.0)) if found else worst
         shown = f"{1e3 * found:.4f} | {ratio:.5f}" if found else "none within 25 % | "

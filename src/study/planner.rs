@@ -134,7 +134,7 @@ pub enum PlanError {
 /// # Errors
 /// The reason why there is no plan.
 pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
-    plan_beside(task, None).await
+    Ok(planned(task).await?.0)
 }
 
 /// The same, and the cheapest run of a method of one's own beside it.
@@ -145,6 +145,15 @@ pub async fn plan_beside<const N: usize>(
     task: Task<N>,
     own: Option<Pair>,
 ) -> Result<Planned, PlanError> {
+    let (mut found, reference) = planned(task).await?;
+    if let Some(pair) = own {
+        found.own = own_run(&reference, pair, found.best.evaluations).await;
+    }
+    Ok(found)
+}
+
+/// A plan with its reference. A program without methods of one's own has no code of theirs.
+async fn planned<const N: usize>(task: Task<N>) -> Result<(Planned, Reference<N>), PlanError> {
     if task.duration.is_nan() || task.duration > MAX_DURATION {
         return Err(PlanError::TooLong(task.duration));
     }
@@ -178,7 +187,8 @@ pub async fn plan_beside<const N: usize>(
         let mut trials = MethodTrials {
             reference: &reference,
             control,
-            own: None,
+            run: |control: ControlLoop<N>| Box::new(control.simulation(task.start)),
+            each: u64::from(control.method.evaluations()),
             best: None,
         };
         fewest(least, affordable, u64::MAX, &mut trials).await;
@@ -191,16 +201,13 @@ pub async fn plan_beside<const N: usize>(
     } else {
         PlanError::TooManySteps(longest_stable)
     };
-    let best = *candidates.last().ok_or(none)?;
-    Ok(Planned {
-        own: match own {
-            Some(pair) => own_run(&reference, pair, best.evaluations).await,
-            None => None,
-        },
-        best,
+    let planned = Planned {
+        best: *candidates.last().ok_or(none)?,
         candidates,
         uncertainty: reference.uncertainty,
-    })
+        own: None,
+    };
+    Ok((planned, reference))
 }
 
 /// The cheapest run found of a method of one's own. Under control its timestep is at most a part of the limit near the
@@ -226,7 +233,8 @@ async fn own_run<const N: usize>(
     let mut trials = MethodTrials {
         reference,
         control,
-        own: Some(pair),
+        run: |control| Box::new(OwnRun::new(control, pair.clone(), reference.task.start)),
+        each,
         best: None,
     };
     let affordable = steps.min(MAX_STEPS) / reference.count;
@@ -235,16 +243,21 @@ async fn own_run<const N: usize>(
 }
 
 /// Runs of one method.
-struct MethodTrials<'a, const N: usize> {
+struct MethodTrials<'a, F, const N: usize> {
     reference: &'a Reference<N>,
     control: ControlLoop<N>,
-    /// A method in place of the loop's.
-    own: Option<Pair>,
+    /// The run of a loop.
+    run: F,
+    /// Evaluations of a step.
+    each: u64,
     /// The last run that was accurate enough.
     best: Option<Candidate>,
 }
 
-impl<const N: usize> StepTrial for &mut MethodTrials<'_, N> {
+impl<F, R: Steppable<N> + 'static, const N: usize> StepTrial for &mut MethodTrials<'_, F, N>
+where
+    F: Fn(ControlLoop<N>) -> Box<R> + Send,
+{
     async fn is_enough(&mut self, steps: u64) -> bool {
         let (reference, method) = (self.reference, self.control.method);
         let timestep = reference.whole / in_f64(steps);
@@ -253,17 +266,7 @@ impl<const N: usize> StepTrial for &mut MethodTrials<'_, N> {
             return false;
         }
         let control = self.control.with_timestep(timestep);
-        let start = reference.task.start;
-        let (run, each): (Box<dyn Steppable<N>>, _) = match &self.own {
-            Some(pair) => (
-                Box::new(OwnRun::new(control, pair.clone(), start)),
-                u64::try_from(pair.evaluations()).unwrap_or(u64::MAX),
-            ),
-            None => (
-                Box::new(control.simulation(start)),
-                u64::from(method.evaluations()),
-            ),
-        };
+        let run = (self.run)(control);
         let allowed = reference.task.error - reference.uncertainty;
         let error = reference.off_by(run, steps, allowed).await;
         let is_enough = error + reference.uncertainty <= reference.task.error;
@@ -271,7 +274,7 @@ impl<const N: usize> StepTrial for &mut MethodTrials<'_, N> {
             self.best = Some(Candidate {
                 method,
                 timestep,
-                evaluations: steps * reference.count * each,
+                evaluations: steps * reference.count * self.each,
                 error,
             });
         }

@@ -226,7 +226,8 @@ pub const fn most_bytes<const N: usize>() -> usize {
 pub async fn rollout<const N: usize>(
     request: RolloutRequest<N>,
 ) -> Result<Rollout<N>, RolloutError> {
-    rollout_along(request, Course::default()).await
+    let run = request.control.simulation(request.start);
+    recorded(request, Course::default(), run).await
 }
 
 /// Does what [`rollout`] does, with samples at other steps, with efforts that are given, or by a method of
@@ -239,6 +240,19 @@ pub async fn rollout_along<const N: usize>(
     course: Course<N>,
 ) -> Result<Rollout<N>, RolloutError> {
     let RolloutRequest { control, start, .. } = request;
+    match course.own.clone() {
+        Some(pair) => recorded(request, course, OwnRun::new(control, pair, start)).await,
+        None => recorded(request, course, control.simulation(start)).await,
+    }
+}
+
+/// The `run` of a request. A program without methods of one's own has no code of theirs.
+async fn recorded<const N: usize>(
+    request: RolloutRequest<N>,
+    course: Course<N>,
+    mut run: impl Recorded<N>,
+) -> Result<Rollout<N>, RolloutError> {
+    let RolloutRequest { control, start, .. } = request;
     let steps = request.steps()?;
     let samples = match course.sampled.len() as u64 {
         0 => request.samples.min(steps + 1),
@@ -246,10 +260,6 @@ pub async fn rollout_along<const N: usize>(
     };
     let period = control.period.steps(control.timestep);
     let intervals = samples.saturating_sub(1).max(1);
-    let mut run: Box<dyn Recorded<N>> = match &course.own {
-        Some(pair) => Box::new(OwnRun::new(control, pair.clone(), start)),
-        None => Box::new(control.simulation(start)),
-    };
     // On the heap, so that a run that has not begun has no memory for them.
     let references = |index| Reference::new(&control, start, index);
     let mut references: Option<Box<[Reference<N>; REFERENCES]>> = request
@@ -296,7 +306,7 @@ pub async fn rollout_along<const N: usize>(
         if run.divergence().is_some() {
             break;
         }
-        made.sample(&control.arm, &*run, references.as_deref(), ideals.as_ref());
+        made.sample(&control.arm, &run, references.as_deref(), ideals.as_ref());
         if let (true, Some([first, ..])) = (course.keeps_reference, references.as_deref()) {
             let lost = State {
                 position: [f64::NAN; N],
@@ -316,7 +326,7 @@ impl<const N: usize> Rollout<N> {
     fn sample(
         &mut self,
         arm: &Arm<N>,
-        run: &dyn Recorded<N>,
+        run: &impl Recorded<N>,
         references: Option<&[Reference<N>; REFERENCES]>,
         ideals: Option<&[Ideal<N>; 2]>,
     ) {

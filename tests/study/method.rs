@@ -78,6 +78,16 @@ fn textbook_methods_have_their_published_orders_and_intervals() {
     assert_eq!(far, [], "measured on the arm");
 }
 
+/// Friction is a part of the arm on which the order is measured.
+#[test]
+fn a_method_has_its_order_on_an_arm_with_friction() {
+    let arm = Arm::<2>::default().with_friction([0.8, 0.3]).unwrap();
+    for (name, order) in [("heun3", 3.0), ("rk4", 4.0), ("dormand_prince5", 5.0)] {
+        let measured = at_once(measure(textbook(name).pair(), &arm)).order.unwrap();
+        assert!((measured - order).abs() < 0.1, "{name}: {measured}");
+    }
+}
+
 fn rk4(change: impl Fn(&mut Vec<Vec<f64>>, &mut Vec<f64>)) -> Given {
     let mut a = vec![vec![], vec![0.5], vec![0.0, 0.5], vec![0.0, 0.0, 1.0]];
     let mut b = [1.0, 2.0, 2.0, 1.0].map(|it| it / 6.0).to_vec();

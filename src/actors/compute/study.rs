@@ -17,7 +17,7 @@ use crate::actors::arm::sim::{ArmSettings, HeldLimit};
 use crate::actors::node::{Call, Nodes, Reply, Unserved};
 use crate::protocol::catalog::Service;
 pub use crate::services::study::{
-    AnalyseMethod, FindHeldLimit, IntegrationStep, PlanRun, PlannedRun, PredictStability,
+    AnalyseMethod, Beside, FindHeldLimit, IntegrationStep, PlanRun, PlannedRun, PredictStability,
     Predicted, Ran, Refused, RunOffline, SuggestGains, Suggested,
 };
 use crate::services::study::{Computed, Integrating, Work};
@@ -44,9 +44,9 @@ impl<const N: usize> Study<N> {
         nodes.serve::<PredictStability<N>>(Service::Stability, address.clone());
         nodes.serve::<FindHeldLimit>(Service::HeldLimit, address.clone());
         nodes.serve::<AnalyseMethod<N>>(Service::Method, address.clone());
-        nodes.serve::<RunOffline<N>>(Service::Rollout, address.clone());
+        nodes.serve::<Beside<RunOffline<N>>>(Service::Rollout, address.clone());
         nodes.serve::<SuggestGains<N>>(Service::SuggestGains, address.clone());
-        nodes.serve::<PlanRun<N>>(Service::Plan, address.clone());
+        nodes.serve::<Beside<PlanRun<N>>>(Service::Plan, address.clone());
         nodes.serve::<IntegrationStep>(Service::IntegrationStep, address.clone());
     }
 }

@@ -4,7 +4,9 @@
 
 use bytes::Bytes;
 
-use super::{Computed, Present, Refused, RobotSettings, StudyWork, arm_of, state_of, with_period};
+use super::{
+    Beside, Computed, Present, Refused, RobotSettings, StudyWork, arm_of, state_of, with_period,
+};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
@@ -16,8 +18,7 @@ use crate::services::arm::{SetGains, SetParams};
 use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::gains::{GainsError, GainsRequirements, SuggestedGains, search_gains};
-use crate::study::method::Given;
-use crate::study::planner::{PlanError, Planned, Task, plan_beside};
+use crate::study::planner::{PlanError, Planned, Task, plan, plan_beside};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -77,8 +78,6 @@ request! {
         control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
         /// Friction, limits, sensors and delay.
         robot: RobotSettings<N> = RobotSettings::read(&mut fields),
-        /// A method of one's own, which is planned beside the arm's.
-        tableau: Option<Given> = super::method::read(&mut fields),
     }
 }
 
@@ -206,16 +205,33 @@ impl<const N: usize> Computed<N> for PlanRun<N> {
     fn work(self, present: Present<N>) -> Self::Work {
         StudyWork::new::<N>(async move {
             let task = task(&self, &present)?;
-            let own = self.tableau.map(|given| given.pair().clone());
-            let planned = plan_beside(task, own).await.map_err(Refused::Study)?;
-            let period = task.control.period.period;
-            let timestep = planned.best.timestep;
-            let period = if period > 0.0 { period } else { timestep };
-            Ok(PlannedRun {
-                planned,
-                control_period: (!task.control.is_free()).then_some(period),
-            })
+            Ok(planned_run(
+                &task,
+                plan(task).await.map_err(Refused::Study)?,
+            ))
         })
+    }
+}
+
+impl<const N: usize> Computed<N> for Beside<PlanRun<N>> {
+    type Work = StudyWork<Self::Answer>;
+
+    fn work(self, present: Present<N>) -> Self::Work {
+        StudyWork::new::<N>(async move {
+            let task = task(&self.ask, &present)?;
+            let planned = plan_beside(task, self.own).await.map_err(Refused::Study)?;
+            Ok(planned_run(&task, planned))
+        })
+    }
+}
+
+fn planned_run<const N: usize>(task: &Task<N>, planned: Planned) -> PlannedRun {
+    let period = task.control.period.period;
+    let timestep = planned.best.timestep;
+    let period = if period > 0.0 { period } else { timestep };
+    PlannedRun {
+        planned,
+        control_period: (!task.control.is_free()).then_some(period),
     }
 }
 

@@ -53,8 +53,40 @@ pub struct Analysed {
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
 
+/// A question with a method of one's own, if it has one. The kernel of the page asks without.
+pub struct Beside<A> {
+    pub(super) ask: A,
+    pub(super) own: Option<Pair>,
+}
+
+impl<A: Ask> Ask for Beside<A> {
+    type Answer = A::Answer;
+}
+
+impl<A: Callable> Callable for Beside<A> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let asked = A::read(service, arguments);
+        let mut fields = Fields::read(arguments, service)?;
+        let own = read(&mut fields).map(|given| given.pair().clone());
+        match (asked, fields.finish()) {
+            (Ok(ask), rejected) if rejected.is_empty() => Ok(Self { ask, own }),
+            (Ok(_), rejected) => Err(rejected),
+            (Err(mut others), rejected) => {
+                others.append(rejected);
+                Err(others)
+            }
+        }
+    }
+}
+
+impl<A: Answered> Answered for Beside<A> {
+    fn write(answer: A::Answer, to: &Address) -> Bytes {
+        A::write(answer, to)
+    }
+}
+
 /// The method of the field `tableau`, if there is one and it is valid.
-pub(super) fn read(fields: &mut Fields<'_>) -> Option<Given> {
+fn read(fields: &mut Fields<'_>) -> Option<Given> {
     fields.object("tableau", from_fields).flatten()
 }
 

@@ -16,7 +16,7 @@ use std::time::Duration;
 pub use self::advice::{PlanRun, PlannedRun, SuggestGains, Suggested};
 pub use self::held_limit::FindHeldLimit;
 pub use self::integration::{Integrating, IntegrationStep, NotIntegrated};
-pub use self::method::{AnalyseMethod, Analysed};
+pub use self::method::{AnalyseMethod, Analysed, Beside};
 pub use self::rollout::{Ran, RolloutWork, RunAnswer, RunOffline};
 pub use self::stability::{PredictStability, Predicted};
 use super::arm::{SensorsInForce, SetLimits, SetParams, SetSensors};

@@ -11,7 +11,8 @@ use bytes::Bytes;
 use serde::{Serialize, Serializer};
 
 use super::{
-    Computed, NUMBER_BYTES, Present, Refused, RobotSettings, Work, arm_of, state_of, with_period,
+    Beside, Computed, NUMBER_BYTES, Present, Refused, RobotSettings, Work, arm_of, state_of,
+    with_period,
 };
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
@@ -23,10 +24,9 @@ use crate::services::FieldByField as _;
 use crate::services::arm::{SetGains, SetParams};
 use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::control_loop::{ControlLoop, no_control};
-use crate::study::method::Given;
 use crate::study::paused::Paused;
 use crate::study::rollout::{
-    Course, MAX_SAMPLES, Rollout, RolloutError, RolloutRequest, most_bytes, rollout_along,
+    Course, MAX_SAMPLES, Rollout, RolloutError, RolloutRequest, most_bytes, rollout, rollout_along,
 };
 
 // ---- question -------------------------------------------------------------------------------------------------------
@@ -60,8 +60,6 @@ request! {
         samples: Option<u64> = fields.count("samples", 2..=MAX_SAMPLES),
         /// Whether to run a reference too.
         reference: Option<bool> = fields.boolean("reference"),
-        /// A method of one's own in place of the named one.
-        tableau: Option<Given> = super::method::read(&mut fields),
     }
 }
 
@@ -137,20 +135,27 @@ impl<const N: usize> RolloutWork<N> {
     /// The computation for `ask` and the `present` arm.
     #[must_use]
     pub fn new(ask: &RunOffline<N>, present: Present<N>) -> Self {
+        Self::by(ask, present, rollout)
+    }
+
+    /// The same by another function than [`rollout`].
+    fn by<F>(
+        ask: &RunOffline<N>,
+        present: Present<N>,
+        made: impl Fn(RolloutRequest<N>) -> F + Clone + Send + 'static,
+    ) -> Self
+    where
+        F: Future<Output = Result<Rollout<N>, RolloutError>> + Send,
+    {
         let samples = usize::try_from(ask.samples.unwrap_or(DEFAULT_SAMPLES));
         let run = |is_alone: bool| {
-            let ask = ask.clone();
+            let (ask, made) = (ask.clone(), made.clone());
             Paused::new(async move {
                 let mut request = request(&ask, &present)?;
                 if is_alone {
                     (request.samples, request.reference) = (2, false);
                 }
-                let own = ask.tableau.map(|given| given.pair().clone());
-                let course = Course {
-                    own,
-                    ..Course::default()
-                };
-                rollout_along(request, course).await.map_err(Refused::Study)
+                made(request).await.map_err(Refused::Study)
             })
         };
         Self {
@@ -170,6 +175,24 @@ impl<const N: usize> Computed<N> for RunOffline<N> {
 
     fn work(self, present: Present<N>) -> Self::Work {
         RolloutWork::new(&self, present)
+    }
+}
+
+impl<const N: usize> Computed<N> for Beside<RunOffline<N>> {
+    type Work = RolloutWork<N>;
+
+    fn work(self, present: Present<N>) -> Self::Work {
+        let own = self.own;
+        RolloutWork::by(&self.ask, present, move |request| {
+            let own = own.clone();
+            rollout_along(
+                request,
+                Course {
+                    own,
+                    ..Course::default()
+                },
+            )
+        })
     }
 }
 

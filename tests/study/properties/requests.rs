@@ -6,7 +6,7 @@ use pendularm::protocol::catalog::Service;
 use pendularm::protocol::op::Arguments;
 use pendularm::services::Callable;
 use pendularm::services::study::{
-    AnalyseMethod, Computed, PlanRun, PredictStability, Present, RunOffline, SuggestGains,
+    AnalyseMethod, Beside, Computed, PlanRun, PredictStability, Present, RunOffline, SuggestGains,
     Work as _,
 };
 use pendularm::study::control_loop::ControlLoop;
@@ -155,8 +155,8 @@ fn any_request_ends<const N: usize>(case: u64, tally: &mut Tally) {
     let ended = match service {
         Service::Stability => pieces::<N, PredictStability<N>>(service, &text),
         Service::Method => pieces::<N, AnalyseMethod<N>>(service, &text),
-        Service::Rollout => pieces::<N, RunOffline<N>>(service, &text),
-        Service::Plan => pieces::<N, PlanRun<N>>(service, &text),
+        Service::Rollout => pieces::<N, Beside<RunOffline<N>>>(service, &text),
+        Service::Plan => pieces::<N, Beside<PlanRun<N>>>(service, &text),
         _ => pieces::<N, SuggestGains<N>>(service, &text),
     };
     match ended {

@@ -5,6 +5,7 @@
 use pendularm::live::ArmRequest;
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::messages;
+use pendularm::protocol::op::fields::Fields;
 use pendularm::protocol::op::{Arguments, CallService};
 use pendularm::protocol::wire::json::Payload;
 use pendularm::services::arm::{
@@ -21,6 +22,11 @@ use pendularm::services::{Address, Answered, Callable as _, NoService};
 use super::Kernel;
 use super::computing::Answering;
 use super::repeated::Repeated;
+
+/// Whether a request has a method of one's own, which the kernel does not have.
+fn has_tableau(service: Service, args: &Arguments) -> bool {
+    Fields::read(args, service).is_ok_and(|mut fields| fields.raw("tableau").is_some())
+}
 
 impl<const N: usize> Kernel<N> {
     /// Takes a call.
@@ -75,6 +81,9 @@ impl<const N: usize> Kernel<N> {
             }
             Service::SuggestGains => {
                 self.begin::<SuggestGains<N>, _>(own, &args, to, Computed::work);
+            }
+            Service::Plan | Service::Rollout if has_tableau(own, &args) => {
+                self.send(to.failure("tableau needs a server"));
             }
             Service::Plan => self.begin::<PlanRun<N>, _>(own, &args, to, Computed::work),
             Service::Rollout => self.begin::<RunOffline<N>, _>(own, &args, to, Repeated::new),
