@@ -68,7 +68,8 @@ def batch() -> Callable[[], int]:
     effort = np.random.default_rng(0).uniform(-1, 1, (ARMS, 2))
 
     def run() -> int:
-        arms.step(2, effort)
+        arms.disturb(effort, 2 * 0.025)
+        arms.step(2)
         return ARMS
 
     return run

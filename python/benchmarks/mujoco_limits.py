@@ -100,8 +100,8 @@ def main():
         except ValueError as why:
             print(f"{name}: {why}", file=sys.stderr)
             continue
-        if not limit:
-            print(f"| {name} | {model.nv} | {'none' if limit is None else 'unstable at every period'} | | |", flush=True)
+        if limit in (0.0, np.inf):
+            print(f"| {name} | {model.nv} | {'none' if limit else 'unstable at every period'} | | |", flush=True)
             continue
         found = measured(model, limit, options.steps, options.delay, law, options.periods)
         ratio = found / limit if found else float("nan")

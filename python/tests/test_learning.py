@@ -68,6 +68,15 @@ def test_the_arms_are_those_of_the_vector_environment(make, name, links):
     assert ends > 15
 
 
+def test_the_end_of_an_episode_has_its_success(make):
+    env = make("PendularmPendubot-v0", 2, max_episode_steps=3)
+    env.reset()
+    for _ in range(3):
+        *_, dones, infos = env.step(np.zeros((2, 1), np.float32))
+    assert dones.all()
+    assert [(info["is_success"], info["held"]) for info in infos] == [(False, 0.0)] * 2
+
+
 def test_attributes_and_methods_are_those_of_the_arms(make):
     env = make("Pendularm-v0", 3, render_mode="rgb_array")
     env.reset()

@@ -61,10 +61,8 @@ class Task:
         self.links = links
         self.reach = arm.reach
         self.lengths = arm.lengths
-        self.efforts = np.zeros(links)
-        self.efforts[self.driven] = self.strength * dynamics.gravity_load(arm, np.zeros(links))[self.driven]
-        self.batch.set_limits(self.efforts)
-        self.action_space = spaces.Box(-1.0, 1.0, (len(self.efforts[self.driven]),), np.float32)
+        self.efforts = self.strength * dynamics.gravity_load(arm, np.zeros(links))[self.driven]
+        self.action_space = spaces.Box(-1.0, 1.0, self.efforts.shape, np.float32)
         bounds = np.array([1.0] * (2 * links) + [FASTEST] * links + self.further_bounds(), np.float32)
         self.observation_space = spaces.Box(-bounds, bounds, dtype=np.float32)
 
@@ -85,9 +83,9 @@ class Task:
 
     def go_on(self, actions: Action) -> None:
         """Takes a step with every arm with its row of `actions`, (arms, links)."""
-        efforts = np.zeros((self.batch.n_arms, self.links))
-        efforts[:, self.driven] = np.clip(actions, -1.0, 1.0) * self.efforts[self.driven]
-        self.batch.step(self.substeps, efforts)
+        # The controllers are off. This takes less time than a step with an effort.
+        self.batch.disturb(np.clip(actions, -1.0, 1.0) * self.efforts, STEP)
+        self.batch.step(self.substeps)
 
     def observe(self) -> Observation:
         position, rate = self.batch.position, self.batch.velocity
@@ -131,6 +129,9 @@ class Underactuated(SwingUp):
 
     def __init__(self, arms: int, *settings: Any) -> None:
         super().__init__(arms, *settings)
+        self.limits = np.zeros(self.links)
+        self.limits[self.driven] = self.efforts
+        self.batch.set_limits(self.limits)
         self.held = np.zeros(arms)
 
     def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
@@ -138,7 +139,9 @@ class Underactuated(SwingUp):
         self.held[list(arms)] = 0.0
 
     def go_on(self, actions: Action) -> None:
-        super().go_on(actions)
+        efforts = np.zeros((self.batch.n_arms, self.links))
+        efforts[:, self.driven] = np.clip(actions, -1.0, 1.0) * self.efforts
+        self.batch.step(self.substeps, efforts)
         is_up = self.batch.end_effector[:, 1] >= UP * self.reach
         self.held = np.where(is_up, self.held + STEP, 0.0)
 

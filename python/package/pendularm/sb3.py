@@ -40,12 +40,14 @@ class Sb3VecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
-        """Takes a step. An ended arm has its last observation as `terminal_observation` in its info."""
+        """Takes a step. An ended arm has its last observation as `terminal_observation` in its info, with the task's own
+        entries, such as `is_success`."""
         observations, rewards, terminated, truncated, infos = self.arms.step(self._actions)
         cut = truncated & ~terminated
         each: list[dict[str, Any]] = [{"TimeLimit.truncated": one} for one in cut.tolist()]
         for arm in np.flatnonzero(terminated | truncated).tolist():
-            each[arm]["terminal_observation"] = infos["final_obs"][arm]
+            last = {name: values[arm].item() for name, values in infos["final_info"].items() if not name.startswith("_")}
+            each[arm] |= {"terminal_observation": infos["final_obs"][arm], **last}
         return observations, rewards.astype(np.float32), terminated | truncated, each
 
     def close(self) -> None:
