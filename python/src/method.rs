@@ -19,6 +19,7 @@ use crate::fields::{self, Bound, Held, Object, Real, refused};
 use crate::floats::Promised;
 use crate::gains;
 use crate::patience::until_done;
+use crate::study::{known, or_none};
 
 /// A tableau. `method.py` has checked the types, and coefficients are texts.
 #[derive(FromPyObject)]
@@ -155,14 +156,14 @@ fn listed<'py>(
     found.set_item("failing_condition", &analysis.failing)?;
     found.set_item("embedded_order", analysis.embedded_order)?;
     found.set_item("faults", &analysis.faults)?;
-    found.set_item("measured_order", analysis.swing.order)?;
-    found.set_item("real_limit", analysis.real_limit)?;
-    found.set_item("imaginary_limit", analysis.imaginary_limit)?;
+    found.set_item("measured_order", known(analysis.swing.order))?;
+    found.set_item("real_limit", or_none(analysis.real_limit))?;
+    found.set_item("imaginary_limit", or_none(analysis.imaginary_limit))?;
     found.set_item("symplectic", analysis.is_symplectic)?;
     found.set_item("region_extent", analysis.region.extent.to_pyarray(py))?;
     found.set_item("region", &analysis.region.rows)?;
-    found.set_item("timestep_limit_held", analysis.timestep_limit_held)?;
-    found.set_item("timestep_limit", analysis.timestep_limit)?;
+    found.set_item("timestep_limit_held", or_none(analysis.timestep_limit_held))?;
+    found.set_item("timestep_limit", or_none(analysis.timestep_limit))?;
     found.set_item("swing_evaluations", analysis.swing.evaluations)?;
     found.set_item("methods", Method::ALL.map(Method::name).to_vec())?;
     let beside: Vec<_> = beside.iter().map(|it| it.evaluations).collect();

@@ -153,12 +153,12 @@ fn listed_limits<'py, const N: usize>(
 }
 
 /// A limit; infinity if there is none.
-fn or_none(limit: Option<f64>) -> f64 {
+pub(crate) fn or_none(limit: Option<f64>) -> f64 {
     limit.unwrap_or(f64::INFINITY)
 }
 
 /// A value; NaN if it is not known.
-fn known(value: Option<f64>) -> f64 {
+pub(crate) fn known(value: Option<f64>) -> f64 {
     value.unwrap_or(f64::NAN)
 }
 

@@ -56,19 +56,19 @@ def test_the_amplification_is_the_stability_polynomial():
 
 
 def test_a_rollout_takes_a_method():
-    swing = dict(q0=[0.4, -0.3], duration=1.0, timestep=0.01, samples=11, reference=True)
+    swing = dict(q=[0.4, -0.3], controller=False, duration=1.0, timestep=0.01, samples=11, reference=True)
     live = pendularm.rollout(**swing)
     own = pendularm.Method(*RK4)
     for method in (own, copy.deepcopy(own), pickle.loads(pickle.dumps(own))):
-        run = pendularm.rollout(integrator=method, **swing)
+        run = pendularm.rollout(method=method, **swing)
         np.testing.assert_allclose(run.positions, live.positions, atol=1e-11)
         assert (run.evaluations, run.error) == (live.evaluations, pytest.approx(live.error, rel=1e-3))
-    better = pendularm.rollout(integrator=pendularm.Method.named("dormand_prince5"), **swing)
+    better = pendularm.rollout(method=pendularm.Method.named("dormand_prince5"), **swing)
     assert better.error < 0.1 * live.error and better.evaluations == 600
 
 
 def test_a_method_is_planned_beside_the_others():
-    swing = dict(q0=[0.4, -0.3], duration=1.0)
+    swing = dict(q=[0.4, -0.3], controller=False, duration=1.0)
     found = pendularm.plan(1e-8, method=pendularm.Method.named("dormand_prince5"), **swing)
     assert found.own.error <= 1e-8 and found.own.evaluations < found.evaluations[0]
     assert pendularm.plan(1e-8, **swing).own is None

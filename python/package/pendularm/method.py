@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _native
-from ._fields import Floats, shown
+from ._fields import Floats, made, shown
 from ._native import Arm, is_masked, is_too_long
 from .study import SuggestedGains
 
@@ -19,7 +19,7 @@ __all__ = ["Method", "MethodAnalysis"]
 
 @dataclass(frozen=True, eq=False)
 class MethodAnalysis:
-    """What is known about a method. A limit of `None` means that it exceeds the search."""
+    """What is known about a method. A limit of `inf` is beyond the search."""
 
     stages: int
     evaluations: int
@@ -32,11 +32,11 @@ class MethodAnalysis:
     """The order of `b_hat`."""
     faults: list[str]
     """Sums that are inconsistent, in words."""
-    measured_order: float | None
-    """The order on a free swing of the arm; `None` if the errors are not finite."""
-    real_limit: float | None
+    measured_order: float
+    """The order on a free swing of the arm; `nan` if the errors are not finite."""
+    real_limit: float
     """The largest `x` with stability on `[-x, 0]`."""
-    imaginary_limit: float | None
+    imaginary_limit: float
     """The largest `y` with stability on `[-iy, iy]`."""
     symplectic: bool
     """Whether it is symplectic, for a constant mass matrix and forces that depend on positions only."""
@@ -44,9 +44,9 @@ class MethodAnalysis:
     """The left end, the right end and the upper end of `region`. Its lower end is 0, (3,)."""
     region: list[str]
     """The upper half of the region of stability, drawn in rows from the top: `#` where no mode grows."""
-    timestep_limit_held: float | None
+    timestep_limit_held: float
     """The largest timestep of the arm's loop if the law runs in every step [s]."""
-    timestep_limit: float | None
+    timestep_limit: float
     """The largest timestep of the arm's loop at the requested control period [s]; 0 if none was found."""
     swing_evaluations: int | None
     """The fewest evaluations found with an error of 1e-6 rad on the swing; `None` if too many are needed."""
@@ -68,14 +68,14 @@ def _entry(name: str, value: Any) -> str:
         # Python does not print integers with thousands of digits.
         with suppress(ValueError):
             return str(value)
-    raise ValueError(f'{name} must be a number or a fraction such as "1/3", got {shown(value)}')
+    raise TypeError(f'{name} must be a number or a fraction such as "1/3", got {shown(value)}')
 
 
 def _entries(name: str, value: Any) -> list[Any]:
     if isinstance(value, np.ndarray) and value.ndim and not is_masked(value):
         value = value.tolist()
     if not isinstance(value, Sequence) or isinstance(value, str | bytes | bytearray | range):
-        raise ValueError(f"{name} must be a list, got {shown(value)}")
+        raise TypeError(f"{name} must be a list, got {shown(value)}")
     return list(value)
 
 
@@ -122,7 +122,7 @@ class Method:
     def named(cls, name: str) -> "Method":
         """A method of textbooks, such as ``"dormand_prince5"``. A wrong name is refused with the list of all."""
         if not isinstance(name, str):
-            raise ValueError(f"name must be a text, got {shown(name)}")
+            raise TypeError(f"name must be a text, got {shown(name)}")
         found = cls.__new__(cls)
         found._set(dict.fromkeys(("a", "b", "c", "b_hat", "a_q", "b_q")) | {"name": name})
         return found
@@ -140,7 +140,7 @@ class Method:
         `gains`, `setpoint` [rad] and `control_period` [s] are those of `stability`.
         """
         loop = {"arm": arm, "gains": gains, "setpoint": setpoint, "control_period": control_period}
-        return MethodAnalysis(**_native.analyse_method(loop | {"tableau": self._tableau}))
+        return made(MethodAnalysis, _native.analyse_method(loop | {"tableau": self._tableau}))
 
     def amplification(self, z: Any) -> Floats:
         """The factor of a mode in a step, for each `z`: its eigenvalue times the timestep. It has the shape of `z`.

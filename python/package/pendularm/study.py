@@ -374,4 +374,5 @@ def plan(
         raise TypeError(f"method must be a Method, got {shown(method)}")
     found = _native.plan(given)
     own = found.pop("own")
+    assert own is None or isinstance(own, tuple)
     return made(Plan, {**found, "own": own and OwnPlan(*own)})
