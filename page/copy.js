@@ -21,15 +21,18 @@ export function tableText({ columns, rows }) {
   return [columns, ...rows].map((row) => row.map((one) => (typeof one === "number" ? exact(one) : one ?? "")).join("\t")).join("\n");
 }
 
-/** Arguments that the library has not, because its arm has no such parts. */
-const PARTS = ["delay", "limits", "viscous", "sensors"];
-/** Arguments that each request names, also those that are the same in all. */
-const VARIED = ["integrator", "timestep"];
+/** Keywords that each request names, also those that are the same in all. */
+const VARIED = ["method", "timestep"];
 
-/** Whether a request is about parts that the library does not have. @param {Asked} asked */
-function hasParts({ delay, limits, viscous, sensors }) {
-  const { encoder_step = [], velocity = "exact", delay: late = 0 } = sensors ?? {};
-  return delay === true || limits?.effort != null || velocity !== "exact" || [...viscous ?? [], ...encoder_step, late].some((one) => one !== 0);
+/** The keywords of a function of the wheel, without those of an ideal robot. @param {Asked} asked @returns {Record<string, any>} */
+function keywords({ params, viscous, integrator, q0, qdot0, delay, limits, sensors, ...rest }) {
+  const { effort = null, anti_windup = "clamp", tracking_time } = limits ?? {};
+  const { encoder_step = [], velocity = "exact", delay: late = Number(delay ?? 0) } = sensors ?? {};
+  return {
+    method: integrator, ...(q0 && { q: q0, qd: qdot0 }), ...rest, ...(late > 0 && { control_delay: late }), ...(effort && { effort_limit: effort }),
+    ...((effort || anti_windup !== "clamp") && { anti_windup, tracking_time }), ...(encoder_step.some(Boolean) && { encoder_step }),
+    ...(velocity !== "exact" && { velocity_source: velocity }),
+  };
 }
 
 /** A value in Python. No text of a request is one of these words. @param {any} value */
@@ -39,39 +42,22 @@ const literal = (value) => JSON.stringify(value).replace(/\b(true|false|null)\b/
 /** @param {Content} content */
 export function pythonText({ name, columns, asked, python, computed = columns, note = "" }) {
   const service = "duration" in asked[0] ? "rollout" : "stability";
-  const isProgram = asked.some(hasParts);
+  const all = asked.map(keywords);
   // Limits do not depend on the present timestep.
-  const left = isProgram ? [] : ["params", ...PARTS, ...(service === "stability" ? ["timestep"] : [])];
-  const isCommon = (/** @type {string} */ key) => !VARIED.includes(key) && asked.every((one) => JSON.stringify(one[key]) === JSON.stringify(asked[0][key]));
+  const left = service === "stability" ? ["timestep"] : [];
+  const isCommon = (/** @type {string} */ key) => !VARIED.includes(key) && all.every((one) => JSON.stringify(one[key]) === JSON.stringify(all[0][key]));
   const part = (/** @type {Asked} */ one, /** @type {boolean} */ common) => Object.entries(one)
     .filter(([key, value]) => value !== undefined && !left.includes(key) && isCommon(key) === common).map(([key, value]) => `"${key}": ${literal(value)}`);
-  const { params } = asked[0];
-  const arm = `arm = pendularm.Arm(${[params.masses.length, ...Object.entries(params).map(([key, one]) => `${key}=${literal(one)}`)].join(", ")})`;
+  const { params, viscous = [] } = asked[0];
+  const parts = Object.entries({ ...params, ...(viscous.some(Boolean) && { viscous }) });
   return [
-    `# pendularm: ${name}`, ...(note ? [`# ${note}`] : []), ...(isProgram ? [PROGRAM] : ["import pendularm"]), "",
-    ...(isProgram ? [server(params.masses.length, service)] : [arm]),
-    "common = {", ...part(asked[0], true).map((one) => `    ${one},`), "}", "asked = [", ...asked.map((one) => `    {${part(one, false).join(", ")}},`), "]",
-    isProgram ? "runs = [ask({**common, **one}) for one in asked]\nserver.terminate()"
-      : `runs = [pendularm.${service}(arm, **common, **one) for one in asked]`,
+    `# pendularm: ${name}`, ...(note ? [`# ${note}`] : []), "import pendularm", "",
+    `arm = pendularm.Arm(${[params.masses.length, ...parts.map(([key, one]) => `${key}=${literal(one)}`)].join(", ")})`,
+    "common = {", ...part(all[0], true).map((one) => `    ${one},`), "}", "asked = [", ...all.map((one) => `    {${part(one, false).join(", ")}},`), "]",
+    `runs = [pendularm.${service}(arm, **common, **one) for one in asked]`,
     `print(${computed.map((one) => JSON.stringify(one)).join(", ")}, sep="\\t")`, `for row in ${python}:`, '    print(*row, sep="\\t")', "",
   ].join("\n");
 }
-
-const PROGRAM = ["# The library has no delay, effort limits, friction and sensors. So the program in the wheel computes this.",
-  "import json", "import socket", "import subprocess", "import sys", "from types import SimpleNamespace", "", "import numpy as np"].join("\n");
-
-/** @param {number} links @param {string} service */
-const server = (links, service) => `command = [sys.executable, "-m", "pendularm", "--bind", "127.0.0.1:0", "--links", "${links}", "--log", "off"]
-server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-host, port = server.stdout.readline().split()[-1].rsplit(":", 1)
-stream = socket.create_connection((host, int(port))).makefile("rw")
-
-def ask(args):
-    print(json.dumps({"op": "call_service", "service": "/study/${service}", "args": args}), file=stream, flush=True)
-    answer = next(one for one in map(json.loads, stream) if one["op"] == "service_response")
-    assert answer["result"], answer
-    return SimpleNamespace(**{key: np.array(one) if isinstance(one, list) else one for key, one in answer["values"].items()})
-`;
 
 /** @type {Content | null} */
 let shown = null;

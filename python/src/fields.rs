@@ -453,3 +453,13 @@ pub(crate) fn number(field: &str, value: Real, bound: Bound) -> PyResult<f64> {
 pub(crate) fn links(value: Whole) -> PyResult<usize> {
     value.within(2..=3, "links must be 2 or 3")
 }
+
+/// A limit; infinity if there is none.
+pub(crate) fn or_none(limit: Option<f64>) -> f64 {
+    limit.unwrap_or(f64::INFINITY)
+}
+
+/// A value; NaN if it is not known.
+pub(crate) fn known(value: Option<f64>) -> f64 {
+    value.unwrap_or(f64::NAN)
+}

@@ -15,11 +15,10 @@ use pyo3::types::PyDict;
 
 use crate::arm::{self, for_either, or_default};
 use crate::arrays::{joints_or, room};
-use crate::fields::{self, Bound, Held, Object, Real, refused};
+use crate::fields::{self, Bound, Held, Object, Real, known, or_none, refused};
 use crate::floats::Promised;
 use crate::gains;
 use crate::patience::until_done;
-use crate::study::{known, or_none};
 
 /// A tableau. `method.py` has checked the types, and coefficients are texts.
 #[derive(FromPyObject)]

@@ -26,7 +26,7 @@ use pyo3::types::PyDict;
 
 use crate::arm::{Given, for_either, or_default};
 use crate::arrays::{ArrayArgument, collected, joints, joints_or, room};
-use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
+use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, known, or_none, refused};
 use crate::floats::Promised;
 use crate::gains;
 use crate::method::Tableau;
@@ -150,16 +150,6 @@ fn listed_limits<'py, const N: usize>(
     )?;
     found.set_item("advised_duration", known(is_free.then_some(FREE_SECONDS)))?;
     Ok(found)
-}
-
-/// A limit; infinity if there is none.
-pub(crate) fn or_none(limit: Option<f64>) -> f64 {
-    limit.unwrap_or(f64::INFINITY)
-}
-
-/// A value; NaN if it is not known.
-pub(crate) fn known(value: Option<f64>) -> f64 {
-    value.unwrap_or(f64::NAN)
 }
 
 fn read_state<const N: usize>(

@@ -18,7 +18,7 @@ ONLY_THERE = {"run time [s]"}
 def number(text: str) -> float | str | None:
     """A cell. The page leaves out what Python calls `None`, and a number that is not finite."""
     try:
-        return None if text in ("", "None", "inf") else float(text)
+        return None if text in ("", "None", "inf", "nan") else float(text)
     except ValueError:
         return text
 

@@ -38,14 +38,14 @@ class OfTheCourse(Copy, CourseTest):
         self.store("motion", seconds=1)
         head, first, *_ = [row.split("\t") for row in self.copied("table", "#course figcaption").split("\n")]
         self.assertEqual((head[0], head[-1], len(first)), ("time [s]", "energy [J]", 14))
-        self.assertIn(f'"q0": [{first[1]}, {first[2]}]', self.copied("python", "#course figcaption"))
+        self.assertIn(f'"q": [{first[1]}, {first[2]}]', self.copied("python", "#course figcaption"))
 
     def test_bars_errors_and_a_map(self):
         for step, name in (("look", "bars"), ("timestep", "errors"), ("limit", "map")):
             self.step(step)
             self.keeps(name)
 
-    def test_a_series_of_runs_and_responses_with_a_limit_that_the_library_does_not_have(self):
+    def test_a_series_of_runs_and_responses_with_an_effort_limit(self):
         self.step("price")
         self.page.click("#course-measure")
         self.keeps("ladder")

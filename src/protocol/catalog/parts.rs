@@ -33,11 +33,11 @@ pub(super) const SENSORS: &[Field] = fields![
 /// The members of `tableau` in a request: a method by its name, or by its coefficients, numbers or fractions.
 pub(super) const TABLEAU: &[Field] = fields![
     "string name?",
-    "float64[][] a?",
+    "float64[] a?",
     "float64[] b?",
     "float64[] c?",
     "float64[] b_hat?",
-    "float64[][] a_q?",
+    "float64[] a_q?",
     "float64[] b_q?",
 ];
 

@@ -131,10 +131,32 @@ fn row(fields: &mut Fields<'_>, name: &'static str) -> Option<Vec<f64>> {
     coefficients(fields, name, &entries)
 }
 
-/// The rows of a field.
+/// The rows of a field: a list of lists, or n² coefficients row by row, as ROS 2 has them.
 fn rows(fields: &mut Fields<'_>, name: &'static str) -> Option<Vec<Vec<f64>>> {
-    let entries = fields.entries(name, MAX_STAGES)?.into_iter().enumerate();
-    let rows = entries.map(|(index, raw)| {
+    let entries = fields.entries(name, MAX_STAGES * MAX_STAGES)?;
+    let is_list = |raw: &&RawValue| raw.get().starts_with('[');
+    if !entries.first().is_none_or(is_list) {
+        let all = coefficients(fields, name, &entries)?;
+        let n = all.len().isqrt();
+        if n * n != all.len() {
+            let count = all.len();
+            fields.refuse(
+                name,
+                &format_args!("must have n² coefficients, got {count}"),
+            );
+            return None;
+        }
+        return Some(all.chunks(n).map(<[f64]>::to_vec).collect());
+    }
+    if entries.len() > MAX_STAGES {
+        let count = entries.len();
+        fields.refuse(
+            name,
+            &format_args!("must have at most {MAX_STAGES} rows, got {count}"),
+        );
+        return None;
+    }
+    let rows = entries.into_iter().enumerate().map(|(index, raw)| {
         let name = format!("{name}[{index}]");
         match json::entries(raw, MAX_STAGES).filter(|it| it.count <= MAX_STAGES) {
             Some(row) => coefficients(fields, &name, &row.first),
