@@ -51,7 +51,7 @@ function showLimit() {
   setText(byId("out-every"), state.enabled === false ? "–" : limitText(everyPose));
   const answer = state.enabled ? answerInForce(state) : null;
   setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? answer.bound_is_proven ? "bound"
-    : "estimated bound" : "found");
+    : "estimate" : "found");
   byId("out-every").title = answer?.worst_pose ? `at (${answer.worst_pose.map((q) => fixed(q, 2)).join(", ")}) rad` : "";
   byId("out-every").classList.toggle("warn", said.kind === "here");
 }
