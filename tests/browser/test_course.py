@@ -234,7 +234,7 @@ class Tasks(CourseTest):
 
     def test_pictures_run_their_scenes(self):
         self.step("extreme")
-        self.assertEqual(self.page.run("[...document.querySelectorAll('.picture')].filter((one) => getComputedStyle(one).opacity === '1').length"), 39,
+        self.assertEqual(self.page.run("[...document.querySelectorAll('.picture')].filter((one) => getComputedStyle(one).opacity === '1').length"), 43,
             "all can be read")
         self.assertEqual(self.page.run("[...document.querySelectorAll('.picture')].filter((one) => one.checkVisibility() && !one.disabled).length"),
             12, "good ones first")
