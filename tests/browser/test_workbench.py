@@ -111,8 +111,8 @@ class Still(PageTest):
 
         def hears_little():
             told, took = hears()
-            # Once a second: a joint state, the diagnostics, the answers about five settings; and one more of each.
-            return told <= 8 * (took + 1)
+            # Once a second: a joint state, the diagnostics, the answers about nine settings; and one more of each.
+            return told <= 11 * (took + 1)
 
         self.wait(hears_little, "once paused it hears little")
 
