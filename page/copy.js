@@ -21,7 +21,7 @@ export function tableText({ columns, rows }) {
   return [columns, ...rows].map((row) => row.map((one) => (typeof one === "number" ? exact(one) : one ?? "")).join("\t")).join("\n");
 }
 
-/** Keywords that each request names, also those that are the same in all. */
+/** Keywords that the program writes for each run, even if they are the same in all. */
 const VARIED = ["method", "timestep"];
 
 /** The keywords of a function of the wheel, without those of an ideal robot. @param {Asked} asked @returns {Record<string, any>} */

@@ -95,7 +95,7 @@ function isReal({ encoder_step, velocity, delay }) {
   return encoder_step.some((one) => one > 0) || velocity !== "exact" || delay > 0;
 }
 
-/** The step of an encoder with so many bits [rad]. @param {number} bits */
+/** The step of an encoder with this number of bits [rad]. @param {number} bits */
 function stepOf(bits) {
   return (2 * Math.PI) / 2 ** bits;
 }

@@ -80,7 +80,10 @@ def test_a_copy_keeps_settings_and_divergence(links):
     one.set_state([0] * links, [1e200] * links)
     one.step(10)
     other = copy.copy(one)
-    for name in ["arm", "method", "timestep", "control_period", "control_delay", "anti_windup", "tracking_time", "velocity_source", "enabled", "steps", "divergence"]:
+    for name in [
+        "arm", "method", "timestep", "control_period", "control_delay",
+        "anti_windup", "tracking_time", "velocity_source", "enabled", "steps", "divergence",
+    ]:
         assert getattr(other, name) == getattr(one, name), name
     assert other.divergence is not None
     assert other.step() == 0

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
-from typing import Any, Literal, ParamSpec, TypeVar
+from typing import Any, Literal, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,13 @@ Floats = NDArray[np.float64]
 
 Method = Literal["euler", "midpoint", "verlet", "rk4"]
 """The name of a method."""
+
+
+class OwnMethod(Protocol):
+    """A `Method` of one's own, for the functions of the study, which `Method` imports."""
+
+    _tableau: dict[str, Any]
+
 
 AntiWindup = Literal["clamp", "none", "conditional", "back_calculation"]
 """What the integral does while an effort is at its limit."""

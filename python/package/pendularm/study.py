@@ -13,16 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from ._fields import AntiWindup, Floats, Method, VelocitySource, made, number, present_name, renamed, shown
+from ._fields import AntiWindup, Floats, Method, OwnMethod, VelocitySource, made, number, present_name, renamed, shown
 from ._native import Arm, Simulation, as_doubles
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
-
-    from .method import Method as OwnMethod
-
-if TYPE_CHECKING:
-    from .method import Method
 
 __all__ = [
     "Critical",
@@ -36,6 +31,7 @@ __all__ = [
     "stability",
     "suggest_gains",
 ]
+
 
 @dataclass(frozen=True)
 class Critical:

@@ -37,21 +37,45 @@ fn entries<'py>(value: &Object<'py>, count: usize) -> PyResult<Option<Vec<Object
     Ok((all.len() == count).then_some(all))
 }
 
-/// One value for all arms, or one for each. `read` returns `None` for a value of another type.
+/// One value for all arms, or one for each. `read` returns `None` for a value of another type. `expected` begins the
+/// refusal: the field, and what one value must be.
 fn one_or_each<T>(
     value: &Object<'_>,
     arms: usize,
+    expected: &str,
     read: impl Fn(&Object<'_>) -> PyResult<Option<T>>,
-    expected: impl Fn(&Object<'_>) -> PyErr,
 ) -> PyResult<Vec<T>> {
+    let wrong = |reason: &Object<'_>| not_one_or_each(reason, value, arms, expected);
     if let Some(alike) = read(value)? {
         return Ok(vec![alike]);
     }
     let mut each = room(arms)?;
-    for one in entries(value, arms)?.ok_or_else(|| expected(value))? {
-        each.push(read(&one)?.ok_or_else(|| expected(&one))?);
+    for one in entries(value, arms)?.ok_or_else(|| wrong(value))? {
+        each.push(read(&one)?.ok_or_else(|| wrong(&one))?);
     }
     Ok(each)
+}
+
+/// The same for whole numbers. Bytes are none, and neither is an array with hidden entries.
+fn one_or_each_whole<T>(
+    value: &Object<'_>,
+    arms: usize,
+    expected: &str,
+    read: impl Fn(&Object<'_>) -> PyResult<Option<T>>,
+) -> PyResult<Vec<T>> {
+    if is_bytes(value) || is_masked(value)? {
+        return Err(not_one_or_each(value, value, arms, expected));
+    }
+    one_or_each(value, arms, expected, read)
+}
+
+/// The refusal of `value`, because of itself or its entry `reason`.
+fn not_one_or_each(reason: &Object<'_>, value: &Object<'_>, arms: usize, expected: &str) -> PyErr {
+    let why = format!(
+        "{expected}, or one for each of {arms} arms, got {}",
+        shown(value)
+    );
+    refusal(reason, why)
 }
 
 /// The refusal of an argument because of itself or one of its entries: a `ValueError` for a number out of range and a
@@ -74,17 +98,8 @@ fn is_bytes(value: &Object<'_>) -> bool {
 
 /// One number of steps for all arms, or one for each.
 pub(super) fn read_steps(steps: &Object<'_>, arms: usize) -> PyResult<Vec<u64>> {
-    let expected = |reason: &Object<'_>| {
-        let why = format!(
-            "steps must be a whole number, at least 0 and less than 2^64, or one for each of {arms} arms, got {}",
-            shown(steps)
-        );
-        refusal(reason, why)
-    };
-    if is_bytes(steps) || is_masked(steps)? {
-        return Err(expected(steps));
-    }
-    one_or_each(steps, arms, |one| Ok(fields::count(one)), expected)
+    let expected = "steps must be a whole number, at least 0 and less than 2^64";
+    one_or_each_whole(steps, arms, expected, |one| Ok(fields::count(one)))
 }
 
 /// One choice for all arms, or one for each, by their names. `choose` reads one.
@@ -98,35 +113,18 @@ pub(super) fn read_names<T>(
         let name = one.extract::<String>().ok();
         name.map(|name| choose(Name::Is(name))).transpose()
     };
-    let all = |value: &Object<'_>| {
-        one_or_each(value, arms, read, |reason| {
-            let why = format!(
-                "{field} must be a name, or one for each of {arms} arms, got {}",
-                shown(value)
-            );
-            refusal(reason, why)
-        })
-    };
+    let expected = format!("{field} must be a name");
+    let all = |value: &Object<'_>| one_or_each(value, arms, &expected, read);
     value.map(all).transpose()
 }
 
 /// One delay for all arms, or one for each.
 pub(super) fn read_delays(value: &Object<'_>, arms: usize) -> PyResult<Vec<u8>> {
-    let expected = |reason: &Object<'_>| {
-        let why = format!(
-            "control_delay must be a whole number from 0 to {MAX_DELAY}, or one for each of {arms} arms, got {}",
-            shown(value)
-        );
-        refusal(reason, why)
-    };
-    if is_bytes(value) || is_masked(value)? {
-        return Err(expected(value));
-    }
-    let read = |one: &Object<'_>| {
+    let expected = format!("control_delay must be a whole number from 0 to {MAX_DELAY}");
+    one_or_each_whole(value, arms, &expected, |one| {
         let is_count = fields::count(one).is_some() || one.extract::<bool>().is_ok();
         is_count.then(|| delay(one)).transpose()
-    };
-    one_or_each(value, arms, read, expected)
+    })
 }
 
 /// The value for an arm, from one for all or one for each.

@@ -305,7 +305,7 @@ pub(super) fn boundary(guess: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
 }
 
 /// The standard deviation of the velocities that encoders of this step \[rad\] give, from the mean velocities of their
-/// periods \[rad/s\]: both joints of a free swing of so many periods of `period` \[s\].
+/// periods \[rad/s\]: both joints of a free swing of this number of periods of `period` \[s\].
 pub fn velocity_noise(step: f64, period: f64, periods: u32) -> f64 {
     let sensors = Sensors {
         encoder_step: [step; 2],

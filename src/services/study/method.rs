@@ -134,8 +134,8 @@ fn row(fields: &mut Fields<'_>, name: &'static str) -> Option<Vec<f64>> {
 /// The rows of a field: a list of lists, or n² coefficients row by row, as ROS 2 has them.
 fn rows(fields: &mut Fields<'_>, name: &'static str) -> Option<Vec<Vec<f64>>> {
     let entries = fields.entries(name, MAX_STAGES * MAX_STAGES)?;
-    let is_list = |raw: &&RawValue| raw.get().starts_with('[');
-    if !entries.first().is_none_or(is_list) {
+    let is_flat = |raw: &&RawValue| !raw.get().starts_with('[');
+    if entries.first().is_some_and(is_flat) {
         let all = coefficients(fields, name, &entries)?;
         let n = all.len().isqrt();
         if n * n != all.len() {
