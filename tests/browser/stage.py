@@ -119,8 +119,9 @@ class PageTest(unittest.TestCase):
         return self.page.screenshot(ARTEFACTS / f"{name}.png", **how)
 
     def image(self, selector):
-        """A picture of a canvas as it is now."""
-        return self.page.decode(base64.b64decode(self.page.run(f"document.querySelector('{selector}').toDataURL().split(',')[1]")))
+        """A picture of a canvas after the next frame, because the page says something before it draws it."""
+        return self.page.decode(base64.b64decode(self.page.run(f"""new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))
+            .then(() => document.querySelector('{selector}').toDataURL().split(',')[1])""")))
 
     def color(self, name):
         """A colour of the style sheet, in the theme that is on."""
