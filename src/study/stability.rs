@@ -33,10 +33,11 @@ use crate::math::integrator::Method;
 /// have errors of some 1e-13.
 pub(super) const NEUTRAL: f64 = 1e-11;
 
-/// Modes below this part of the fastest rate say nothing about the timestep. Rounding spreads a double eigenvalue at zero,
-/// such as that of a joint that drifts, to the square root of its size, so such a mode may only seem to grow. The growth
-/// that a timestep causes is below [`NEUTRAL`] for all of them, and [`slow_modes`] finds growth in continuous time.
-const DOUBTFUL: f64 = 1e-6;
+/// Modes below this part of the fastest rate say nothing about the timestep: the square root of [`NEUTRAL`]. Rounding
+/// spreads a double eigenvalue at zero, such as that of a joint that drifts, to the square root of its size, so such a
+/// mode may only seem to grow. The growth that a timestep causes is below [`NEUTRAL`] for all of them, and [`slow_modes`]
+/// finds growth in continuous time.
+const DOUBTFUL: f64 = 3.2e-6;
 
 /// Start of the search, in units of the fastest time constant. An undamped swing already grows measurably here under
 /// Euler (1e-3) and midpoint (2.5e-10).

@@ -163,6 +163,14 @@ fn an_arm_without_some_of_its_gains_is_limited_only_where_something_grows() {
     assert!(tally.tried > 0);
 }
 
+/// The double eigenvalue of a drifting joint is spread by rounding to 1.2e-6 of the fastest rate.
+#[test]
+fn a_drifting_joint_beside_a_stiff_one_sets_no_limit() {
+    let mut tally = Tally::default();
+    nothing_is_limited_where_nothing_grows::<3>(6135, &mut tally);
+    assert_eq!((tally.tried, tally.outside), (2, 0));
+}
+
 /// Free arms that a search over poses without gravity gave no timestep. A swing of Verlet is stable up to `2/ω`.
 #[test]
 fn a_free_arm_gets_a_timestep_near_its_limit() {
