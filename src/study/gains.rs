@@ -99,6 +99,13 @@ pub enum GainsError {
         Shown(.0.settling_time), Shown(.0.margin), Shown(*.1)
     )]
     NotFound(GainsRequirements, f64),
+    /// The same for motors with a limit, which may be the reason.
+    #[error(
+        "settling_time: no gains found that settle within {} s under the limits of the effort and leave a margin of {} \
+         at the timestep {} s; allow more time, raise limits.effort or set another limits.anti_windup",
+        Shown(.0.settling_time), Shown(.0.margin), Shown(*.1)
+    )]
+    NotFoundUnderLimits(GainsRequirements, f64),
 }
 
 /// Searches gains for the arm, method and timestep of `control`, in pieces. Its gains and setpoint are ignored.
@@ -137,7 +144,10 @@ pub async fn search_gains<const N: usize>(
             pace *= FASTER;
         }
     }
-    Err(GainsError::NotFound(requirements, timestep))
+    Err(match control.limits.effort {
+        None => GainsError::NotFound(requirements, timestep),
+        Some(_) => GainsError::NotFoundUnderLimits(requirements, timestep),
+    })
 }
 
 /// The default gains, scaled to an arm's inertia and to a speed factor.

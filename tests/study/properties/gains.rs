@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
+use pendularm::math::limits::{AntiWindup, Limits};
 use pendularm::math::pid::Setpoint;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::gains::{GainsError, GainsRequirements, MOVES, SETTLED, search_gains};
@@ -82,4 +83,61 @@ fn an_unavailable_resource_is_refused_with_its_reason() {
     let tiny = ControlLoop::free(Arm::<2>::default()).with_timestep(1e-6);
     let why = refusal(&tiny, requirements);
     assert_eq!(why, GainsError::TooManySteps(4.0 / 1e-6));
+}
+
+/// How many of 20 moves within a turn are late under the limits of `control`.
+fn late_moves(control: &ControlLoop<2>, settling_time: f64) -> usize {
+    let mut dice = Dice::of(1);
+    let is_late = |_: &u32| {
+        let setpoint = Setpoint::at(std::array::from_fn(|_| TAU * dice.any()));
+        let mut live = ControlLoop {
+            setpoint,
+            ..*control
+        }
+        .simulation(State::rest());
+        let mut off_at = 0.0;
+        while live.time() < 2.0 * settling_time && live.step() {
+            let off = |i: usize| (live.state().position[i] - setpoint.position[i]).abs();
+            if (0..2).any(|i| off(i) > SETTLED) {
+                off_at = live.time();
+            }
+        }
+        off_at > 1.5 * settling_time
+    };
+    (0..20).filter(is_late).count()
+}
+
+/// The search makes its moves with motors of the given limit. With the default anti-windup none settles in time, and
+/// the gains for ideal motors do not either. With another they settle, later than with ideal motors.
+#[test]
+fn gains_settle_under_an_effort_limit_or_are_refused_with_it() {
+    let requirements = GainsRequirements {
+        settling_time: 4.0,
+        margin: 2.0,
+    };
+    let ideal = ControlLoop::free(Arm::<2>::default());
+    let limited = |anti_windup| ControlLoop {
+        limits: Limits {
+            effort: Some([60.0, 20.0]),
+            anti_windup,
+            ..Limits::default()
+        },
+        ..ideal
+    };
+    let without = at_once(search_gains(ideal, requirements)).unwrap();
+    let clamp = limited(AntiWindup::Clamp);
+    let why = refusal(&clamp, requirements).to_string();
+    assert!(
+        why.contains("under the limits") && why.contains("limits.anti_windup"),
+        "{why}"
+    );
+    let with_gains = |control: ControlLoop<2>, gains| ControlLoop { gains, ..control };
+    assert!(late_moves(&with_gains(clamp, without.gains), 4.0) > 0);
+    let conditional = limited(AntiWindup::Conditional);
+    let with = at_once(search_gains(conditional, requirements)).unwrap();
+    assert!(
+        with.settled_after > 1.2 * without.settled_after,
+        "{with:?} {without:?}"
+    );
+    assert_eq!(late_moves(&with_gains(conditional, with.gains), 4.0), 0);
 }
