@@ -93,7 +93,13 @@ impl<const N: usize> Limits<N> {
     pub fn applied(&self, demanded: [f64; N]) -> [f64; N] {
         match &self.effort {
             None => demanded,
-            Some(limit) => std::array::from_fn(|i| bounded(demanded[i], limit[i])),
+            Some(limit) => {
+                let mut applied = demanded;
+                for i in 0..N {
+                    applied[i] = bounded(demanded[i], limit[i]);
+                }
+                applied
+            }
         }
     }
 
@@ -112,51 +118,61 @@ impl<const N: usize> Limits<N> {
         if self.are_absent() {
             return pid.control(state, dt);
         }
-        let (gains, setpoint) = (pid.gains(), pid.setpoint());
-        let joints: [(f64, f64); N] = std::array::from_fn(|i| {
-            let error = setpoint.position[i] - state.position[i];
-            let velocity_error = setpoint.velocity[i] - state.velocity[i];
-            let demanded = |integral: f64| {
-                gains.kp[i] * error + gains.ki[i] * integral + gains.kd[i] * velocity_error
-            };
-            let before = pid.integral()[i];
-            let integral = before + error * dt;
+        // A loop, because the compiler does not inline a closure for each joint.
+        let mut control = Control {
+            effort: [0.0; N],
+            integral: *pid.integral(),
+        };
+        for i in 0..N {
             let limit = self.effort.map_or(f64::INFINITY, |effort| effort[i]);
-            let (integral, effort) = match self.anti_windup {
-                AntiWindup::Clamp => {
-                    let integral = integral.clamped(INTEGRAL_LIMIT);
-                    (integral, demanded(integral))
+            let (integral, effort) = self.joint(pid, state, i, limit, dt);
+            control.integral[i] = integral;
+            control.effort[i] = bounded(effort, limit);
+        }
+        control
+    }
+
+    /// The integral \[rad s\] of joint `i` after a period, and its effort without the limit \[N m\].
+    #[inline(always)]
+    fn joint(&self, pid: &Pid<N>, state: &State<N>, i: usize, limit: f64, dt: f64) -> (f64, f64) {
+        let (gains, setpoint) = (pid.gains(), pid.setpoint());
+        let error = setpoint.position[i] - state.position[i];
+        let velocity_error = setpoint.velocity[i] - state.velocity[i];
+        let demanded = |integral: f64| {
+            gains.kp[i] * error + gains.ki[i] * integral + gains.kd[i] * velocity_error
+        };
+        let before = pid.integral()[i];
+        let integral = before + error * dt;
+        match self.anti_windup {
+            AntiWindup::Clamp => {
+                let integral = integral.clamped(INTEGRAL_LIMIT);
+                (integral, demanded(integral))
+            }
+            AntiWindup::None => (integral, demanded(integral)),
+            AntiWindup::Conditional => {
+                let effort = demanded(integral);
+                if effort.abs() >= limit && effort * error > 0.0 {
+                    (before, demanded(before))
+                } else {
+                    (integral, effort)
                 }
-                AntiWindup::None => (integral, demanded(integral)),
-                AntiWindup::Conditional => {
-                    let effort = demanded(integral);
-                    if effort.abs() >= limit && effort * error > 0.0 {
-                        (before, demanded(before))
-                    } else {
-                        (integral, effort)
-                    }
+            }
+            AntiWindup::BackCalculation => {
+                let effort = demanded(integral);
+                let excess = bounded(effort, limit) - effort;
+                if excess == 0.0 || gains.ki[i] <= 0.0 {
+                    (integral, effort)
+                } else {
+                    let share = (dt / self.tracking_time).min(1.0);
+                    (integral + share * excess / gains.ki[i], effort)
                 }
-                AntiWindup::BackCalculation => {
-                    let effort = demanded(integral);
-                    let excess = bounded(effort, limit) - effort;
-                    if excess == 0.0 || gains.ki[i] <= 0.0 {
-                        (integral, effort)
-                    } else {
-                        let share = (dt / self.tracking_time).min(1.0);
-                        (integral + share * excess / gains.ki[i], effort)
-                    }
-                }
-            };
-            (integral, bounded(effort, limit))
-        });
-        Control {
-            effort: joints.map(|(_, effort)| effort),
-            integral: joints.map(|(integral, _)| integral),
+            }
         }
     }
 }
 
 /// `effort` within ±`limit`. The sum turns -0 into 0, which is shown without a sign.
+#[inline(always)]
 fn bounded(effort: f64, limit: f64) -> f64 {
     if effort.abs() <= limit {
         effort

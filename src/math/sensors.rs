@@ -76,15 +76,18 @@ impl<const N: usize> Sensors<N> {
     /// The measured values of `state`, `period` \[s\] after the measurement `before`.
     #[must_use]
     pub fn measured(&self, state: &State<N>, before: Option<&State<N>>, period: f64) -> State<N> {
-        let position = std::array::from_fn(|i| {
-            let (position, step) = (state.position[i], self.encoder_step[i]);
-            let counted = (position / step).round() * step;
-            if step > 0.0 && counted.is_finite() {
-                counted
-            } else {
-                position
+        let mut position = state.position;
+        for i in 0..N {
+            let step = self.encoder_step[i];
+            if step > 0.0 {
+                let counted = (position[i] / step).round() * step;
+                position[i] = if counted.is_finite() {
+                    counted
+                } else {
+                    position[i]
+                };
             }
-        });
+        }
         let velocity = match (self.velocity, before) {
             (VelocitySource::Exact, _) => state.velocity,
             (VelocitySource::Difference, None) => [0.0; N],

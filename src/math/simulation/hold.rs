@@ -228,7 +228,11 @@ impl<const N: usize> Hold<N> {
             None => {
                 if held.due == 0 {
                     let before = self.memory.measured.as_ref();
-                    let seen = self.sensors.measured(state, before, self.length);
+                    let seen = if self.remembers {
+                        self.sensors.measured(state, before, self.length)
+                    } else {
+                        *state
+                    };
                     let control = self.limits.control(pid, &seen, self.length);
                     after.effort = match held.period.delay {
                         0 => control.effort,
