@@ -115,13 +115,13 @@ fn adaptive_baselines_follow_their_tolerance() {
             coarse.error < 1e-4 && fine.error < 1e-9,
             "{order}: {coarse:?} {fine:?}"
         );
-        // In equal steps the error shows the order itself.
+        // In equal steps the error shows at least the order; a misprint would lower it.
         let error = |steps| {
             task.run(Solver::Explicit(method.clone()), steps, LOST)
                 .error
         };
         let seen = (error(steps) / error(2 * steps)).log2();
-        assert!((seen - order).abs() < 0.5, "{order}: {seen}");
+        assert!(seen > order - 0.5, "{order}: {seen}");
     }
     let taylor = task.run(Solver::Taylor(1e-12), 4096, LOST);
     assert!(taylor.error < 1e-9, "{taylor:?}");

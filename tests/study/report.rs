@@ -127,7 +127,7 @@ fn a_method_in_a_file_is_a_line_of_the_first_figure() {
         "Rodas3",
     ] {
         assert!(
-            csv.contains(&format!("Free swing, 2 links: {curve}")),
+            csv.contains(&format!("Free swing, 2 links, by time: {curve}")),
             "{curve}"
         );
     }

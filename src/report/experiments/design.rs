@@ -18,7 +18,7 @@ use crate::math::simulation::ControlPeriod;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Linear, equilibrium};
 use crate::study::matrix::{Matrix, largest};
-use crate::study::stability::{bisect, repeated, runge_kutta};
+use crate::study::stability::{Stepping, bisect, repeated, runge_kutta};
 
 /// The setpoint \[rad\].
 const SETPOINT: [f64; 2] = [0.4, 0.8];
@@ -107,7 +107,7 @@ pub fn limit(gains: &Feedback) -> f64 {
 /// The longest control period \[s\] of the sampled PID.
 pub fn limit_of_pid() -> Option<f64> {
     let linear = Linear::at_setpoint(&pid(SHORT));
-    crate::study::stability::Stepping::held(&linear, pid(SHORT).method, 64, 0).limit()
+    Stepping::held(&linear, pid(SHORT).method, 64, 0).limit()
 }
 
 fn pid(period: f64) -> ControlLoop<2> {

@@ -9,45 +9,54 @@ use crate::report::experiments::design::{
 };
 use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number, seconds};
+use crate::study::stability::bisect;
 
 /// Ends of the axis of control periods \[s\], and the period of the motions that are drawn.
-const PERIODS: (f64, f64) = (1e-3, 1e-1);
+const PERIODS: (f64, f64) = (1e-3, 0.2);
 const DRAWN: f64 = 0.01;
 
 /// The end of the axis of deviations, and of a motion that exceeds it \[rad\].
 const SHOWN: f64 = 0.5;
 
+/// Halvings of these ends for a limit, to one part in a thousand.
+const HALVINGS: u32 = 12;
+
 /// A deviation beyond this part of the least one is no longer about the same \[rad\].
 const SAME: f64 = 1.1;
+
+/// Gains for a period \[s\], where there are some; none of them for the PID.
+type Design<'a> = Box<dyn Fn(f64) -> Option<Option<Feedback>> + 'a>;
+
+fn designs(continuous: &Feedback) -> [(Key, Design<'_>); 3] {
+    [
+        (
+            Key::line("c2", "sampled PID, default gains").marked(Marker::Square),
+            Box::new(|_| Some(None)),
+        ),
+        (
+            Key::line("c3", "LQR for continuous time, sampled").marked(Marker::Triangle),
+            Box::new(|_| Some(Some(continuous.clone()))),
+        ),
+        (
+            Key::line("c1", "LQR for its period").marked(Marker::Diamond),
+            Box::new(|period| designed(period).map(Some)),
+        ),
+    ]
+}
 
 pub(super) fn make(section: &mut Section) {
     let Some(continuous) = designed(SHORT) else {
         return;
     };
     let periods = edges(PERIODS, section.choose(24, 8));
-    // The sampled PID, the design for continuous time, and that for the period.
-    type Design<'a> = Box<dyn Fn(f64) -> Option<Feedback> + 'a>;
-    let designs: [(Key, Design<'_>); 3] = [
-        (
-            Key::line("c2", "sampled PID, default gains").marked(Marker::Square),
-            Box::new(|_| None),
-        ),
-        (
-            Key::line("c3", "LQR for continuous time, sampled").marked(Marker::Triangle),
-            Box::new(|_| Some(continuous.clone())),
-        ),
-        (
-            Key::line("c1", "LQR for its period").marked(Marker::Diamond),
-            Box::new(designed),
-        ),
-    ];
+    let designs = designs(&continuous);
     let mut deviations = Plot::new(
         "Deviation by control period",
         Axis::log("control period", Unit::Seconds, PERIODS),
         Axis::log(
             "root mean square deviation [rad]",
             Unit::Number,
-            (1e-2, 1.0),
+            (1e-2, 1e2),
         ),
     );
     let mut motions = Plot::new(
@@ -57,12 +66,14 @@ pub(super) fn make(section: &mut Section) {
     );
     let mut longest = f64::NAN;
     for (key, gains) in designs {
-        let run = |period: f64| returned(period, gains(period).as_ref());
+        let run = |period: f64| match gains(period) {
+            Some(gains) => returned(period, gains.as_ref()),
+            None => (Vec::new(), f64::INFINITY),
+        };
         let points: Vec<(f64, f64)> = periods.iter().map(|it| (*it, run(*it).1)).collect();
         // The last design's value remains.
         let least = points.iter().map(|it| it.1).fold(f64::INFINITY, f64::min);
-        let same = points.iter().take_while(|it| it.1 <= SAME * least);
-        longest = same.last().map_or(f64::NAN, |it| it.0);
+        longest = bisect(PERIODS, HALVINGS, |period| run(period).1 <= SAME * least);
         deviations.add(Curve::line(key.clone(), points));
         let samples = run(DRAWN).0;
         let inside = samples.into_iter().take_while(|it| it.1.abs() <= SHOWN);

@@ -81,55 +81,68 @@ pub(super) fn make(section: &mut Section) {
 /// The baselines on the free swing of 2 links.
 fn baselines(section: &Section, halvings: u32) -> Vec<Baseline> {
     let task = swing_of_solvers();
-    let look = |class, marker, label: &str| Key::line(class, label).marked(marker).dashed();
-    let mut equal = vec![
-        (
-            look("c3", Marker::Circle, "semi-implicit Euler"),
-            Solver::Explicit(Arc::new(Explicit::semi_implicit())),
-        ),
-        (
-            look("soft", Marker::Down, "implicit midpoint"),
-            Solver::ImplicitMidpoint,
-        ),
-        (look("soft", Marker::Plus, "Rodas3"), Solver::Rodas3),
-    ];
-    if let Some((name, pair)) = &section.own {
-        let solver = Solver::Explicit(Arc::new(Explicit::new(pair.clone())));
-        equal.push((look("c2", Marker::Plus, name), solver));
-    }
-    let mut found: Vec<Baseline> = Vec::new();
-    for (key, solver) in equal {
+    let equal = |solver: Solver| -> Vec<(Solver, u64)> {
         let steps = (0..=halvings).map(|halving| OUTPUTS << halving);
-        let runs = steps.map(|steps| Run::of(&task, &solver, steps));
-        found.push((key, runs.collect()));
-    }
-    let dormand_prince5 = Explicit::dormand_prince5().map(Arc::new);
-    let dop853 = Explicit::dop853().map(Arc::new);
-    let adaptive = |method: Option<Arc<Explicit>>| {
-        move |tolerance| Some(Solver::Adaptive(method.clone()?, tolerance))
+        steps.map(|steps| (solver.clone(), steps)).collect()
     };
-    type Within = Box<dyn Fn(f64) -> Option<Solver>>;
-    let within: [(Key, Within); 3] = [
+    let explicit = |method| equal(Solver::Explicit(Arc::new(method)));
+    let within = |solver: &dyn Fn(f64) -> Solver| -> Vec<(Solver, u64)> {
+        let tolerances = (4..=28).map(|half| 10_f64.powf(-0.5 * f64::from(half)));
+        tolerances
+            .map(|tolerance| (solver(tolerance), MOST_TRIED))
+            .collect()
+    };
+    let mut all = vec![
         (
-            look("ink", Marker::Square, "Dormand-Prince 5, adaptive"),
-            Box::new(adaptive(dormand_prince5)),
+            "c3",
+            Marker::Circle,
+            "semi-implicit Euler",
+            explicit(Explicit::semi_implicit()),
         ),
         (
-            look("ink", Marker::Diamond, "DOP853, adaptive"),
-            Box::new(adaptive(dop853)),
+            "soft",
+            Marker::Down,
+            "implicit midpoint",
+            equal(Solver::ImplicitMidpoint),
         ),
+        ("soft", Marker::Plus, "Rodas3", equal(Solver::Rodas3)),
         (
-            look("c4", Marker::Triangle, "Taylor series, adaptive"),
-            Box::new(|tolerance| Some(Solver::Taylor(tolerance))),
+            "c4",
+            Marker::Triangle,
+            "Taylor series, adaptive",
+            within(&Solver::Taylor),
         ),
     ];
-    for (key, solver) in within {
-        let tolerances = (4..=28).map(|half| 10_f64.powf(-0.5 * f64::from(half)));
-        let solvers = tolerances.filter_map(solver);
-        let runs = solvers.map(|solver| Run::of(&task, &solver, MOST_TRIED));
-        found.push((key, runs.collect()));
+    for (marker, label, method) in [
+        (
+            Marker::Square,
+            "Dormand-Prince 5, adaptive",
+            Explicit::dormand_prince5(),
+        ),
+        (Marker::Diamond, "DOP853, adaptive", Explicit::dop853()),
+    ] {
+        let method = method.map(Arc::new);
+        let of = |method: Arc<Explicit>| {
+            within(&move |tolerance| Solver::Adaptive(method.clone(), tolerance))
+        };
+        all.extend(method.map(|method| ("ink", marker, label, of(method))));
     }
-    found
+    if let Some((name, pair)) = &section.own {
+        all.push((
+            "c2",
+            Marker::Plus,
+            name,
+            explicit(Explicit::new(pair.clone())),
+        ));
+    }
+    let all = all.into_iter().map(|(class, marker, label, runs)| {
+        let key = Key::line(class, label).marked(marker).dashed();
+        let runs = runs
+            .iter()
+            .map(|(solver, steps)| Run::of(&task, solver, *steps));
+        (key, runs.collect())
+    });
+    all.collect()
 }
 
 impl Data {
@@ -245,14 +258,16 @@ fn against_cost(section: &mut Section, data: &[Data], baselines: &[Baseline]) {
     let counts = swing.all().chain(beside()).map(Run::evaluations);
     let evaluations = Axis::around("evaluations of the dynamics", Unit::Number, counts);
     let first = [
-        (&x, Run::at_time as Place),
-        (&evaluations, Run::at_evaluations),
+        ("time", &x, Run::at_time as Place),
+        ("evaluations", &evaluations, Run::at_evaluations),
     ];
-    let first = first.map(|(x, place)| {
+    let first = first.map(|(what, x, place)| {
         let curves = baselines
             .iter()
             .map(|(key, runs)| curve(key.clone(), runs, place));
-        plot(swing, x, place).with(curves)
+        let mut plot = plot(swing, x, place).with(curves);
+        plot.title = format!("{}, by {what}", plot.title);
+        plot
     });
     let others = others.iter().map(|data| plot(data, &x, Run::at_time));
     let plots: Vec<Plot> = first.into_iter().chain(others).collect();

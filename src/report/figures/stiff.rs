@@ -138,9 +138,9 @@ fn energies() -> Plot {
     let plot = Plot::new(format!("Spring, ratio {ENERGY_RATIO}"), x, y);
     let counts = STEPS_PER_PERIOD.map(|eighth| 10_f64.powf(0.125 * f64::from(eighth)));
     let points: Vec<(f64, [f64; 3])> = counts.map(|it| (it, remaining(&scene, it))).collect();
-    plot.with((0..SOLVERS.len()).filter_map(|index| {
+    plot.with((0..SOLVERS.len()).map(|index| {
         let of = |(x, parts): &(f64, [f64; 3])| Some((*x, *parts.get(index)?));
-        Some(Curve::line(key(index), points.iter().filter_map(of)))
+        Curve::line(key(index), points.iter().filter_map(of))
     }))
 }
 
