@@ -8,7 +8,7 @@
 //! | brake | d, with k = 0 | `d (M⁻¹)₂₂`, decays |
 //! | spring | k, with d = 0 | `√(k (M⁻¹)₂₂)`, oscillates |
 //! | light last link | 1 / its mass, with fixed k and d | `d (M⁻¹)₂₂`, decays |
-//! | controller | k and d | `√(k (M⁻¹)₂₂)`, decays as fast as it turns |
+//! | controller | k and d | `√(k (M⁻¹)₂₂)`, decays without oscillating |
 //!
 //! The spring and the controller begin where their effort balances the swing, at a small velocity. So the fast motion has
 //! an energy of its own, which the spring keeps.
