@@ -15,7 +15,7 @@ const LAST: &str = "work";
 const ABSTRACT: [&str; 5] = ["error", "budget", "stability", "stiff", "scenarios"];
 
 const METHOD: &str = "Sections run in parallel on all cores; sections that measure times run one after the other. \
-     Times are processor times of one thread, the minimum of repeats after one untimed run. While the \
+     Times are processor times of one thread, the median of 31 runs after one untimed run. While the \
      clock runs nothing is counted, compared or written. Errors come from separate runs of the same steps. References \
      are Taylor series of order 30 in double-double arithmetic. They start from the Lagrangian and share no formula \
      with the arm's own kernel. Their uncertainty is the distance to a second series of other order and tolerance. The \

@@ -15,6 +15,8 @@ pub(crate) struct Machine {
     /// The program's version, with the commit of a release build.
     pub(crate) version: String,
     pub(crate) facts: Vec<(String, String)>,
+    #[serde(skip)]
+    pub(crate) processor: String,
 }
 
 impl Machine {
@@ -29,18 +31,23 @@ impl Machine {
         let load = load().map(|load| {
             format!("{load} (1, 5 and 15 minutes); above 0 other programs were running")
         });
+        let unknown = || "unknown".to_owned();
+        let processor = processor().unwrap_or_else(unknown);
         let facts = [
             ("Version", Some(format!("pendularm {VERSION}"))),
             ("Build", Some(build.to_owned())),
             ("Target", Some(format!("{ARCH} {OS}, {}", features()))),
-            ("Processor", processor()),
+            ("Processor", Some(processor.clone())),
             ("Cores", cores.map(|cores| cores.to_string())),
             ("Load when started", load),
         ];
-        let unknown = || "unknown".to_owned();
         let facts = facts.map(|(name, value)| (name.to_owned(), value.unwrap_or_else(unknown)));
         let (version, facts) = (VERSION.to_owned(), facts.to_vec());
-        Self { version, facts }
+        Self {
+            version,
+            facts,
+            processor,
+        }
     }
 }
 

@@ -28,7 +28,14 @@ use clap::builder::PossibleValuesParser;
 use figures::{Maker, SECTIONS};
 use machine::Machine;
 use section::Section;
+use serde_json::value::{RawValue, to_raw_value};
 use serde_json::{Value, json};
+
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Arguments;
+use crate::services::Callable as _;
+use crate::services::study::AnalyseMethod;
+use crate::study::tableau::Pair;
 
 /// Measure error against run time and stability, and write a page about it
 #[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
@@ -43,6 +50,9 @@ pub struct ReportOptions {
     /// A coarse report in less than a minute
     #[arg(long)]
     pub quick: bool,
+    /// A JSON file with an explicit Runge-Kutta method, as in `/study/method`, for the first figure
+    #[arg(long, value_name = "FILE")]
+    pub method: Option<PathBuf>,
 }
 
 /// Why there is no report.
@@ -51,6 +61,9 @@ pub enum ReportError {
     /// The file of a kept section cannot be read.
     #[error("cannot read {path}: {error}; recompute it with --only NAME", path = .0.display(), error = .1)]
     Read(PathBuf, io::Error),
+    /// The file of a method cannot be read, or is no method.
+    #[error("cannot use the method in {path}: {error}", path = .0.display(), error = .1)]
+    Method(PathBuf, String),
     /// A file or directory cannot be written.
     #[error("cannot write {path}: {error}", path = .0.display(), error = .1)]
     Write(PathBuf, io::Error),
@@ -67,6 +80,7 @@ pub fn sections() -> impl Iterator<Item = &'static str> {
 /// A section that is kept and cannot be read, or a file that cannot be written.
 pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
     let machine = Machine::here();
+    let own = options.method.as_deref().map(own_method).transpose()?;
     let kept = options.out.join("sections");
     fs::create_dir_all(&kept).map_err(|error| ReportError::Write(kept.clone(), error))?;
     let file = |maker: &Maker| kept.join(format!("{}.json", maker.name));
@@ -79,7 +93,7 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
     }
     let (of, done) = (makers.len(), AtomicUsize::new(0));
     sections.extend(side_by_side(makers, |maker| {
-        let section = make(maker, options, &machine)?;
+        let section = make(maker, options, &machine, own.clone())?;
         write(
             &file(maker),
             &serde_json::to_string(&section).unwrap_or_default(),
@@ -142,7 +156,27 @@ fn say(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
 }
 
-fn make(maker: &Maker, options: &ReportOptions, machine: &Machine) -> Result<Section, ReportError> {
+/// Name and tableaus of the method in a file, which is the `tableau` of a request to `/study/method`.
+fn own_method(path: &Path) -> Result<(String, Pair), ReportError> {
+    let refused = |why: String| ReportError::Method(path.to_owned(), why);
+    let text = fs::read_to_string(path).map_err(|error| refused(error.to_string()))?;
+    let tableau: &RawValue =
+        serde_json::from_str(&text).map_err(|error| refused(error.to_string()))?;
+    let request = to_raw_value(&json!({ "tableau": tableau }));
+    let request = request.map_err(|error| refused(error.to_string()))?;
+    let asked = AnalyseMethod::<2>::read(Service::Method, &Arguments::from(request));
+    let given = asked.map_err(|why| refused(why.to_string()))?.method;
+    let pair = given.ok_or_else(|| refused("there is no method".to_owned()))?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    Ok((name.into_owned(), pair.pair().clone()))
+}
+
+fn make(
+    maker: &Maker,
+    options: &ReportOptions,
+    machine: &Machine,
+    own: Option<(String, Pair)>,
+) -> Result<Section, ReportError> {
     let started = Instant::now();
     let mut section = Section {
         name: maker.name.to_owned(),
@@ -150,6 +184,8 @@ fn make(maker: &Maker, options: &ReportOptions, machine: &Machine) -> Result<Sec
         version: machine.version.clone(),
         quick: options.quick,
         out: options.out.clone(),
+        processor: machine.processor.clone(),
+        own,
         ..Section::default()
     };
     (maker.make)(&mut section);

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use super::svg::{HEIGHT, Key, Marker, Plot, WIDTH, csv, escape, lines, style};
 use crate::math::count::length_in_f64;
+use crate::study::tableau::Pair;
 
 /// One part of the report.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -29,6 +30,12 @@ pub(crate) struct Section {
     pub(crate) quick: bool,
     /// Figures and tables, in order.
     pub(crate) html: String,
+    /// The processor of the measurements.
+    #[serde(skip)]
+    pub(super) processor: String,
+    /// Name and tableaus of the reader's own method.
+    #[serde(skip)]
+    pub(super) own: Option<(String, Pair)>,
     /// Folder of the report, which may contain external counts.
     #[serde(skip)]
     pub(super) out: PathBuf,
@@ -73,7 +80,11 @@ impl Section {
     /// A grid of panels with its files. The title states the result, and the caption explains the figure.
     pub(crate) fn figure(&mut self, name: &str, title: &str, caption: &str, panels: &[Plot]) {
         let mut legend: Vec<&Key> = Vec::new();
-        for key in panels.iter().flat_map(Plot::keys) {
+        for key in panels
+            .iter()
+            .flat_map(|plot| &plot.curves)
+            .map(|it| &it.key)
+        {
             match legend.iter_mut().find(|known| known.label == key.label) {
                 // A line and its marks are one entry.
                 Some(known) if known.marker == Marker::None => *known = key,
@@ -103,7 +114,7 @@ impl Section {
 pub(crate) struct Table {
     name: &'static str,
     title: String,
-    caption: &'static str,
+    caption: String,
     head: Vec<String>,
     pub(crate) rows: Vec<Vec<Cell>>,
 }
@@ -112,13 +123,13 @@ impl Table {
     pub(crate) fn new<'a>(
         name: &'static str,
         title: impl Into<String>,
-        caption: &'static str,
+        caption: impl Into<String>,
         head: impl IntoIterator<Item = &'a str>,
     ) -> Self {
         Self {
             name,
             title: title.into(),
-            caption,
+            caption: caption.into(),
             head: head.into_iter().map(str::to_owned).collect(),
             rows: Vec::new(),
         }
@@ -145,7 +156,7 @@ impl Table {
             "<{heading}>{}</{heading}><p class=\"caption\">{}</p>{}<div class=\"scroll\"><table><thead><tr>{}</tr>\
              </thead><tbody>{}</tbody></table></div>{}",
             escape(&self.title),
-            escape(self.caption),
+            escape(&self.caption),
             fold.0,
             self.head.iter().map(head).collect::<String>(),
             self.rows.iter().map(row).collect::<String>(),

@@ -296,7 +296,7 @@ pub(super) fn growth(generator: &Matrix, period: f64, slow_modes: impl FnOnce() 
 }
 
 /// `((I + h E)^m - I) / (m h)` for the `m` substeps of a period, by repeated squaring.
-pub(super) fn repeated(step: &Matrix, h: f64, substeps: u32) -> Matrix {
+pub(crate) fn repeated(step: &Matrix, h: f64, substeps: u32) -> Matrix {
     let mut sum = step.clone();
     // Each binary digit of `m` after the first doubles the number of steps, and a 1 adds one.
     for digit in (0..substeps.ilog2()).rev() {
@@ -389,7 +389,7 @@ pub(super) async fn bisect_in_pieces(
 }
 
 /// `A + h/2 A² + … + h^(p-1)/p! A^p`, by Horner's rule.
-pub(super) fn runge_kutta(a: &Matrix, order: u32, h: f64) -> Matrix {
+pub(crate) fn runge_kutta(a: &Matrix, order: u32, h: f64) -> Matrix {
     let mut sum = a.clone();
     for k in (2..=order).rev() {
         sum = a.clone().plus(h / f64::from(k), &a.product(&sum));

@@ -220,7 +220,7 @@ impl Pair {
     }
 
     /// Whether the acceleration of a stage is used.
-    fn evaluates(&self, stage: usize) -> bool {
+    pub(crate) fn evaluates(&self, stage: usize) -> bool {
         let below = self.v.a.iter().filter_map(|row| row.get(stage));
         below.chain(self.v.b.get(stage)).any(|it| *it != 0.0)
     }

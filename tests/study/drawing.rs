@@ -100,13 +100,11 @@ fn a_column_is_named_by_its_axis_with_the_unit() {
     let panels = [
         draw(Axis::linear("largest error [rad]", (0.0, 3.0))),
         draw(Axis::linear("growth, per period", (0.0, 3.0))),
-        Plot::bars("Time per step [ns]", "c1", [("one", Some(7.0))]),
     ];
     assert_eq!(
         csv(&panels),
-        "curve,timestep [s],largest error [rad],\"growth, per period\",Time per step [ns],note\n\
-         panel: rk4,5e-1,2e0,,,\n\
-         panel: rk4,5e-1,,2e0,,\n\
-         Time per step [ns]: one,,,,7e0,\n"
+        "curve,timestep [s],largest error [rad],\"growth, per period\",note\n\
+         panel: rk4,5e-1,2e0,,\n\
+         panel: rk4,5e-1,,2e0,\n"
     );
 }

@@ -1,10 +1,15 @@
 //! The findings of the README and of docs/study.md, run again with the searches and experiments behind them.
 
+use std::sync::Arc;
+
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::budget::Budget;
-use pendularm::report::experiments::error::{OUTPUTS, scenes};
+use pendularm::report::experiments::design::{SHORT, designed, limit, limit_of_pid, returned};
+use pendularm::report::experiments::error::{OUTPUTS, scenes, swing_of_solvers};
+use pendularm::report::experiments::solvers::{Explicit, Solver};
+use pendularm::report::experiments::task::LOST;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::stability::limits;
 
@@ -42,6 +47,49 @@ fn the_timestep_and_the_evaluations_are_runs() {
     agrees(README, "Verlet needs ", verlet, 3);
     let euler = evaluations(Method::Euler) / rk4;
     agrees(README, "as many, and Euler ", euler, 4);
+}
+
+#[test]
+fn the_evaluations_of_the_baselines_are_runs() {
+    let task = swing_of_solvers();
+    let method = Arc::new(Explicit::dop853().unwrap());
+    for (error, rk4, dop853) in [
+        (1e-6, "within 10⁻⁶ rad RK4 takes ", "DOP853 "),
+        (1e-9, "within 10⁻⁹ rad RK4 takes ", "DOP853 "),
+    ] {
+        let (_, after) = STUDY.split_once(rk4).unwrap();
+        let fixed = Solver::Fixed(Method::Rk4);
+        let fewest = task.fewest(fixed, error, (1, 1 << 21), 256).unwrap();
+        let per_second = |evaluations: u64| (evaluations as f64 / task.duration).round();
+        assert_eq!(printed(STUDY, rk4), per_second(fewest.evaluations));
+        let tolerances = (4..=28).map(|half| 10_f64.powf(-0.5 * f64::from(half)));
+        let solvers = tolerances.map(|it| Solver::Adaptive(method.clone(), it));
+        let runs = solvers.map(|solver| task.run(solver, 1 << 12, LOST));
+        let least = runs
+            .filter(|run| run.error <= error)
+            .map(|run| run.evaluations);
+        assert_eq!(printed(after, dop853), per_second(least.min().unwrap()));
+    }
+}
+
+#[test]
+fn the_periods_of_the_designs_are_limits() {
+    let continuous = designed(SHORT).unwrap();
+    agrees(STUDY, "PID is stable up to ", limit_of_pid().unwrap(), 3);
+    agrees(
+        STUDY,
+        "for continuous time is stable up to ",
+        limit(&continuous),
+        3,
+    );
+    let deviation = |period| returned(period, designed(period).as_ref()).1;
+    let least = [1e-3, 2e-3, 5e-3]
+        .map(deviation)
+        .into_iter()
+        .fold(1.0, f64::min);
+    let period = printed(STUDY, "up to a control period of ");
+    let [below, above] = [0.98, 1.02].map(|part| deviation(part * period) / least);
+    assert!(below <= 1.1 && above > 1.1, "{below} {above}");
 }
 
 /// 2 s in 2048 steps: the power of two next to the default timestep.

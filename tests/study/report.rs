@@ -14,6 +14,7 @@ fn make(out: &Path, only: &[&str]) -> Result<PathBuf, ReportError> {
         out: out.to_owned(),
         only: only.iter().map(|&name| name.to_owned()).collect(),
         quick: true,
+        method: None,
     })
 }
 
@@ -90,13 +91,55 @@ fn an_unreadable_kept_section_is_reported_with_its_file() {
     assert!(!out.join("sections/conditioning.json").exists());
 }
 
+/// The reader's own method is a line of the first figure. A file that is no method is refused with its fault.
+#[test]
+fn a_method_in_a_file_is_a_line_of_the_first_figure() {
+    let out = Folder::new("report-method");
+    let file = out.join("heun.json");
+    let make = |tableau: &str| {
+        fs::write(&file, tableau).unwrap();
+        run(&ReportOptions {
+            out: out.join("out"),
+            only: vec!["error".to_owned()],
+            quick: true,
+            method: Some(file.clone()),
+        })
+    };
+    for (tableau, fault) in [
+        (r#"{"a": [[], [1]], "b": [0.5]}"#, "rows"),
+        (r#"{"a": [[], ["1/0"]], "b": [0.5, 0.5]}"#, "a[1][0]"),
+        ("{", "EOF"),
+        ("3", "tableau"),
+    ] {
+        let error = make(tableau).unwrap_err().to_string();
+        assert!(
+            error.contains("heun.json") && error.contains(fault),
+            "{error}"
+        );
+    }
+    make(r#"{"a": [[], [1]], "b": ["1/2", "1/2"]}"#).unwrap();
+    let csv = fs::read_to_string(out.join("out/work-precision-time.csv")).unwrap();
+    for curve in [
+        "heun, dashed",
+        "semi-implicit Euler",
+        "DOP853",
+        "Taylor series",
+        "Rodas3",
+    ] {
+        assert!(
+            csv.contains(&format!("Free swing, 2 links, by time: {curve}")),
+            "{curve}"
+        );
+    }
+}
+
 /// A count without a kept number would be shown as not measured, and a line of the wrong columns would be left out.
 #[test]
 fn every_line_and_every_count_of_the_work_is_shown() {
     let out = Folder::new("report-work");
     let (html, report) = made(&out, &["work"]);
     assert!(!html.contains("not measured"));
-    assert!(html.contains("counted with pendularm "), "no version");
+    assert!(html.contains("by callgrind, with pendularm "), "no version");
     let work = &report["sections"][0];
     let count = |list: &Value| list.as_array().unwrap().len();
     let lines = |text: &str| text.lines().count();

@@ -4,8 +4,9 @@
 //!
 //! **Invariant:** the steps are those of the live arm, bit for bit, wherever the live arm can take them.
 
-use super::reference::{DoubleDouble, Law, ReferenceMotion};
-use super::task::Task;
+use super::reference::{Law, ReferenceMotion};
+use super::solvers::{self, Solver};
+use super::task::{Ready, Task, TaskRun};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
@@ -115,41 +116,53 @@ fn reach(name: &'static str, title: &'static str, sampling: Sampling) -> Scene {
     }
 }
 
-/// An arm in motion. The reference has a continuous-time law with integral gains of 0.
+/// The free swing of 2 links for every solver of the report.
+pub fn swing_of_solvers() -> Task<Solver> {
+    let (control, start) = (ControlLoop::free(Arm::default()), State::rest());
+    let ready = move |solver, steps| solvers::ready(&control, start, ARM_DURATION, solver, steps);
+    task(&control, start, Box::new(ready))
+}
+
+/// An arm in motion.
 fn arm_scene<const N: usize>(
     (name, title): (&'static str, &'static str),
-    law_loop: ControlLoop<N>,
+    control: ControlLoop<N>,
     start: State<N>,
     sampling: Sampling,
 ) -> Scene {
-    let exact_law = Law::Continuous(law_loop.gains, law_loop.setpoint);
-    let reference = ReferenceMotion::new(&law_loop.arm, &start, &exact_law, ARM_DURATION);
-    let times = (1..=OUTPUTS).map(|index| ARM_DURATION * in_f64(index) / in_f64(OUTPUTS));
+    let ready = move |method, steps| -> Box<dyn TaskRun> {
+        let timestep = ARM_DURATION / in_f64(steps);
+        let control = control.with_method(method).with_timestep(timestep);
+        let run: Box<dyn Steppable<N>> = match sampling {
+            Sampling::Continuous => Box::new(ContinuousLoop::new(control, start, [0.0; N])),
+            Sampling::Held => Box::new(control.simulation(start)),
+        };
+        Box::new(run)
+    };
     Scene {
         name,
         title,
-        is_held: sampling == Sampling::Held && !law_loop.is_free(),
+        is_held: sampling == Sampling::Held && !control.is_free(),
         limits: Vec::new(),
-        task: Task {
-            duration: ARM_DURATION,
-            uncertainty: largest(times.map(|time| reference.uncertainty(time))),
-            looks: LOOKS,
-            unit: 1,
-            ready: Box::new(move |method, steps| {
-                let timestep = ARM_DURATION / in_f64(steps);
-                let law_loop = law_loop.with_method(method).with_timestep(timestep);
-                let run: Box<dyn Steppable<N>> = match sampling {
-                    Sampling::Continuous => {
-                        Box::new(ContinuousLoop::new(law_loop, start, [0.0; N]))
-                    }
-                    Sampling::Held => Box::new(law_loop.simulation(start)),
-                };
-                Box::new(run)
-            }),
-            distance: Box::new(move |done, steps, angles| {
-                let timestep = DoubleDouble::from(ARM_DURATION / in_f64(steps));
-                reference.angle_error(timestep * in_f64(done), angles)
-            }),
-        },
+        task: task(&control, start, Box::new(ready)),
+    }
+}
+
+/// The task of a motion. Its reference has a continuous-time law with integral gains of 0.
+fn task<S, const N: usize>(
+    control: &ControlLoop<N>,
+    start: State<N>,
+    ready: Box<Ready<S>>,
+) -> Task<S> {
+    let law = Law::Continuous(control.gains, control.setpoint);
+    let reference = ReferenceMotion::new(&control.arm, &start, &law, ARM_DURATION);
+    let times = (1..=OUTPUTS).map(|index| ARM_DURATION * in_f64(index) / in_f64(OUTPUTS));
+    Task {
+        duration: ARM_DURATION,
+        uncertainty: largest(times.map(|time| reference.uncertainty(time))),
+        looks: LOOKS,
+        unit: 1,
+        ready,
+        distance: Box::new(move |time, angles| reference.angle_error(time, angles)),
     }
 }

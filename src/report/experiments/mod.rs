@@ -13,10 +13,12 @@
 pub mod budget;
 pub mod chaos;
 pub mod conditioning;
+pub mod design;
 pub mod error;
 pub mod measure;
 pub mod nonlinear;
 pub mod reference;
 pub mod scenarios;
+pub mod solvers;
 pub mod stiff;
 pub mod task;

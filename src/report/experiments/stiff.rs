@@ -1,33 +1,32 @@
-//! The limits of explicit methods: the cost of an error as the arm gets stiffer, beside two implicit methods.
+//! The limits of explicit methods: the cost of an error as an arm gets stiffer, for an explicit and two implicit methods.
 //!
-//! The arm is released from a bent pose, with a brake at its elbow: an effort `-d q̇₂` at every instant. A stronger
-//! brake makes the elbow's own rate `d (M⁻¹)₂₂` faster than that of the swing, and hardly changes the motion. An
-//! explicit method has to follow that rate, an implicit one has not.
+//! A 2-link arm swings from a bent pose under an effort `u = k (q* - q₂) - d q̇₂` at its elbow, at every instant. Each
+//! scene has an elbow whose own motion gets faster than the swing, and hardly changes it:
 //!
-//! | baseline | order | stable | evaluations of a step, with `2 N` for a Jacobian by differences |
-//! | --- | --- | --- | --- |
-//! | implicit midpoint | 2 | for every rate that decays | 1 for the start, one for each iteration |
-//! | Rodas3 | 3 | for every rate that decays; what is infinitely fast is gone after a step | 3 |
+//! | scene | what grows | the elbow's rate |
+//! | --- | --- | --- |
+//! | brake | d, with k = 0 | `d (M⁻¹)₂₂`, decays |
+//! | spring | k, with d = 0 | `√(k (M⁻¹)₂₂)`, oscillates |
+//! | light last link | 1 / its mass, with fixed k and d | `d (M⁻¹)₂₂`, decays |
+//! | controller | k and d | `√(k (M⁻¹)₂₂)`, decays without oscillating |
 //!
-//! The baselines are here for the report alone: none can be selected on the live arm. Source: Hairer and Wanner,
-//! *Solving Ordinary Differential Equations II* (1996), ch. IV.3 and IV.7; for Rodas3, Sandu et al., *Atmospheric
-//! Environment* 31 (1997).
+//! The spring and the controller begin where their effort balances the swing, at a small velocity. So the fast motion has
+//! an energy of its own, which the spring keeps.
 //!
-//! **Invariant:** every evaluation is counted, those for Jacobians too.
+//! **Invariant:** the ratio of a scene is the elbow's rate per that of the swing, at the arm hanging with the elbow at its
+//! target.
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::task::{Task, TaskRun};
+use super::solvers::{self, Solver};
+use super::task::Task;
 use crate::math::arm::{Arm, State};
-use crate::math::count::in_f64;
+use crate::math::count::{in_f64, whole};
 use crate::math::dynamics::{forward_dynamics, mass_matrix};
-use crate::math::integrator::{Method, moved};
 use crate::math::pid::{Gains, Setpoint};
-use crate::study::beside::Steppable;
-use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::linear::{Linear, gravity_gradient};
-use crate::study::matrix::{Matrix, largest, largest_difference};
+use crate::study::matrix::{largest, largest_difference};
 use crate::study::stability::{Sampling, largest_timestep};
 
 /// Simulated time of a run \[s\].
@@ -39,80 +38,86 @@ const OUTPUTS: u64 = 8;
 /// Steps of the reference.
 const REFERENCE_STEPS: u64 = 1 << 15;
 
-/// Most iterations of Newton's method in a step of the implicit midpoint rule.
-const MAX_ITERATIONS: usize = 12;
-
-/// An explicit method of the live arm, or a baseline.
+/// What makes the elbow fast.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Solver {
-    /// One of the four.
-    Explicit(Method),
-    /// `y + h f((y + y') / 2)`, solved by Newton's method.
-    ImplicitMidpoint,
-    /// A Rosenbrock method of four stages.
-    Rodas3,
+pub enum Stiffness {
+    /// Damping.
+    Brake,
+    /// A spring without damping.
+    Spring,
+    /// A light last link under fixed gains.
+    LightLink,
+    /// Gains of critical damping.
+    Controller,
 }
 
-impl Solver {
+impl Stiffness {
     /// All of them.
-    pub const ALL: [Self; 6] = [
-        Self::Explicit(Method::Euler),
-        Self::Explicit(Method::Midpoint),
-        Self::Explicit(Method::Verlet),
-        Self::Explicit(Method::Rk4),
-        Self::ImplicitMidpoint,
-        Self::Rodas3,
-    ];
-
-    /// Its name.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Explicit(method) => method.name(),
-            Self::ImplicitMidpoint => "implicit midpoint",
-            Self::Rodas3 => "rodas3",
-        }
-    }
-
-    /// Whether it is a baseline of the report.
-    pub const fn is_baseline(self) -> bool {
-        !matches!(self, Self::Explicit(_))
-    }
+    pub const ALL: [Self; 4] = [Self::Brake, Self::Spring, Self::LightLink, Self::Controller];
 }
 
-/// Positions and velocities of both joints.
-type Whole = [f64; 4];
-
-/// A braked arm.
+/// An arm with a fast elbow.
 pub struct StiffScene {
     control: ControlLoop<2>,
+    start: State<2>,
     /// The elbow's rate per that of the swing.
     pub ratio: f64,
     /// The motion, whose reference is known at eight instants.
     pub task: Task<Solver>,
 }
 
-const START: State<2> = State {
-    position: [0.4, -0.3],
-    velocity: [0.0; 2],
-};
+/// The pose at the start \[rad\].
+const BENT: [f64; 2] = [0.4, -0.3];
 
-/// The pose of both rates: hanging, with the elbow at its angle of the start. A strong brake keeps it there.
-const HANGING: [f64; 2] = [-FRAC_PI_2, START.position[1]];
+/// Velocity of the sprung or controlled elbow at the start \[rad/s\].
+const FLICK: f64 = 1e-3;
+
+/// The spring of the light link \[N m/rad\].
+const SOFT: f64 = 5.0;
+
+/// The elbow at `angle` \[rad\] of an arm that hangs.
+const fn hanging(angle: f64) -> [f64; 2] {
+    [-FRAC_PI_2, angle]
+}
+
+/// The rate of the swing \[1/s\], and `(M⁻¹)₂₂` \[1/(kg m²)\].
+fn rates(arm: Arm<2>) -> (f64, f64) {
+    let pose = hanging(BENT[1]);
+    let swing = gravity_gradient(&arm, &pose)[0] / mass_matrix(&arm, &pose)[0][0];
+    let linear = Linear::at(&ControlLoop::free(arm), &pose, &[false; 2]);
+    (swing.sqrt(), linear.inverse_mass[(1, 1)])
+}
 
 impl StiffScene {
-    /// The scene whose elbow's rate is `ratio` times that of its swing.
-    pub fn new(ratio: f64) -> Self {
-        let arm = Arm::<2>::default();
-        let pull = gravity_gradient(&arm, &HANGING)[0];
-        let swing = (pull / mass_matrix(&arm, &HANGING)[0][0]).sqrt();
-        let linear = Linear::at(&ControlLoop::free(arm), &HANGING, &[false; 2]);
+    /// The scene of this ratio.
+    pub fn new(stiffness: Stiffness, ratio: f64) -> Self {
+        let (swing, inverse) = rates(Arm::default());
+        let (rate, damping) = (ratio * swing, swing / inverse);
+        let mut arm = Arm::default();
+        let (kp, kd) = match stiffness {
+            Stiffness::Brake => (0.0, ratio * damping),
+            Stiffness::Spring => (rate * rate / inverse, 0.0),
+            Stiffness::Controller => (rate * rate / inverse, 2.0 * rate / inverse),
+            Stiffness::LightLink => {
+                arm = Arm::new([1.0; 2], [1.0, 1.0 / ratio], arm.gravity()).unwrap_or(arm);
+                (SOFT, damping)
+            }
+        };
+        let mut start = State::at_rest(BENT);
+        let mut target = BENT[1];
+        if matches!(stiffness, Stiffness::Spring | Stiffness::Controller) {
+            target += balance(&arm, &start) / kp;
+            start.velocity[1] = FLICK;
+        }
+        let of_elbow = |value| [0.0, value];
         let gains = Gains {
-            kd: [0.0, ratio * swing / linear.inverse_mass[(1, 1)]],
+            kp: of_elbow(kp),
+            kd: of_elbow(kd),
             ..no_control()
         };
-        let control = ControlLoop::new(arm, gains, Setpoint::default());
+        let control = ControlLoop::new(arm, gains, Setpoint::at(of_elbow(target)));
         let outputs = |solver| -> Vec<Vec<f64>> {
-            let mut run = ready(&control, solver, REFERENCE_STEPS);
+            let mut run = solvers::ready(&control, start, DURATION, solver, REFERENCE_STEPS);
             let output = |_| {
                 run.advance(REFERENCE_STEPS / OUTPUTS);
                 run.place().to_vec()
@@ -122,18 +127,26 @@ impl StiffScene {
         let [fine, other] = [Solver::Rodas3, Solver::ImplicitMidpoint].map(outputs);
         let pairs = fine.iter().zip(&other);
         let differences = pairs.map(|(one, other)| largest_difference(one, other));
+        let of_link = rates(arm);
         Self {
             control,
-            ratio,
+            start,
+            ratio: match stiffness {
+                Stiffness::LightLink => damping * of_link.1 / of_link.0,
+                _ => ratio,
+            },
             task: Task {
                 duration: DURATION,
                 uncertainty: largest(differences),
                 looks: OUTPUTS,
                 unit: OUTPUTS,
-                ready: Box::new(move |solver, steps| ready(&control, solver, steps)),
-                distance: Box::new(move |done, steps, place| {
-                    let output = usize::try_from(done * OUTPUTS / steps).unwrap_or(0);
-                    fine.get(output.saturating_sub(1))
+                ready: Box::new(move |solver, steps| {
+                    solvers::ready(&control, start, DURATION, solver, steps)
+                }),
+                distance: Box::new(move |time, place| {
+                    let output = (time.to_f64() / DURATION * in_f64(OUTPUTS)).round();
+                    let output = usize::try_from(whole(output).saturating_sub(1)).unwrap_or(0);
+                    fine.get(output)
                         .map_or(f64::NAN, |fine| largest_difference(fine, place))
                 }),
             },
@@ -141,133 +154,50 @@ impl StiffScene {
     }
 
     /// The fewest steps that the linearised loop allows an explicit method where it hangs; none for a baseline.
-    pub fn fewest_stable_steps(&self, solver: Solver) -> Option<f64> {
-        let Solver::Explicit(method) = solver else {
+    pub fn fewest_stable_steps(&self, solver: &Solver) -> Option<f64> {
+        let Solver::Fixed(method) = solver else {
             return None;
         };
-        let linear = Linear::at(&self.control, &HANGING, &[false; 2]);
-        let limit = largest_timestep(&linear, method, Sampling::Continuous)?;
+        let pose = hanging(BENT[1]);
+        let linear = Linear::at(&self.control, &pose, &[false; 2]);
+        let limit = largest_timestep(&linear, *method, Sampling::Continuous)?;
         Some(DURATION / limit)
     }
-}
 
-/// A run of a solver with this number of steps, before its first.
-fn ready(control: &ControlLoop<2>, solver: Solver, steps: u64) -> Box<dyn TaskRun> {
-    let h = DURATION / in_f64(steps);
-    let step: fn(&mut Implicit) -> Option<Whole> = match solver {
-        Solver::Explicit(method) => {
-            let control = control.with_method(method).with_timestep(h);
-            let run = ContinuousLoop::new(control, START, [0.0; 2]);
-            let run: Box<dyn Steppable<2>> = Box::new(run);
-            return Box::new(run);
+    /// The energy of the elbow's own motion after a run, per that at the start; infinite after a divergence.
+    pub fn fast_energy(&self, solver: Solver, steps: u64) -> f64 {
+        let mut run = (self.task.ready)(solver, steps);
+        if !run.advance(steps) {
+            return f64::INFINITY;
         }
-        Solver::ImplicitMidpoint => Implicit::midpoint,
-        Solver::Rodas3 => Implicit::rodas3,
-    };
-    let [a, b] = START.position;
-    Box::new(Implicit {
-        control: *control,
-        step,
-        h,
-        y: [a, b, 0.0, 0.0],
-        evaluations: 0,
-    })
-}
-
-/// The run of a baseline.
-struct Implicit {
-    control: ControlLoop<2>,
-    /// The change in a step; none where it can't be computed.
-    step: fn(&mut Self) -> Option<Whole>,
-    /// Length of a step \[s\].
-    h: f64,
-    y: Whole,
-    evaluations: u64,
-}
-
-impl TaskRun for Implicit {
-    fn advance(&mut self, steps: u64) -> u64 {
-        for taken in 0..steps {
-            let change = (self.step)(self).unwrap_or([f64::NAN; 4]);
-            self.y = moved(&self.y, 1.0, &change);
-            if !self.y.iter().all(|y| y.is_finite()) {
-                return taken;
-            }
-        }
-        steps
+        let mut end = self.start;
+        end.position.copy_from_slice(run.place());
+        end.velocity.copy_from_slice(run.rates());
+        self.energy(&end) / self.energy(&self.start)
     }
 
-    fn place(&self) -> &[f64] {
-        &self.y[..2]
-    }
-
-    fn evaluations(&self) -> u64 {
-        self.evaluations
-    }
-}
-
-impl Implicit {
-    fn slope(&mut self, y: &Whole) -> Whole {
-        self.evaluations += 1;
-        let (q, v) = ([y[0], y[1]], [y[2], y[3]]);
-        let kd = &self.control.gains.kd;
-        let a = forward_dynamics(&self.control.arm, &q, &v, &[-kd[0] * v[0], -kd[1] * v[1]]);
-        [v[0], v[1], a[0], a[1]]
-    }
-
-    /// `f` at the present state, and `∂f/∂y` by differences.
-    fn jacobian(&mut self) -> (Whole, Matrix) {
-        let y = self.y;
-        let f = self.slope(&y);
-        let mut jacobian = Matrix::zeros(4);
-        for column in 0..4 {
-            let nudge = 1e-7 * (1.0 + y[column].abs());
-            let mut near = y;
-            near[column] += nudge;
-            let moved = self.slope(&near);
-            for row in 0..4 {
-                jacobian[(row, column)] = (moved[row] - f[row]) / (near[column] - y[column]);
-            }
-        }
-        (f, jacobian)
-    }
-
-    fn midpoint(&mut self) -> Option<Whole> {
-        let (y, h) = (self.y, self.h);
-        let (mut k, jacobian) = self.jacobian();
-        let newton = jacobian.scaled(-0.5 * h).plus_diagonal(1.0);
-        for _ in 0..MAX_ITERATIONS {
-            let f = self.slope(&moved(&y, 0.5 * h, &k));
-            let left: Vec<f64> = (0..4).map(|i| f[i] - k[i]).collect();
-            let change: Whole = newton.solve(&left)?.try_into().ok()?;
-            k = moved(&k, 1.0, &change);
-            if (0..4).all(|i| (h * change[i]).abs() <= 1e-13 * (1.0 + y[i].abs())) {
-                break;
-            }
-        }
-        Some(k.map(|k| h * k))
-    }
-
-    /// In the form `(I/(γh) - J) k = f(y + …) + …/h`, γ = 1/2.
-    fn rodas3(&mut self) -> Option<Whole> {
-        let (y, h) = (self.y, self.h);
-        let (start, jacobian) = self.jacobian();
-        let matrix = Matrix::from_fn(4, |i, j| {
-            let diagonal = if i == j { 2.0 / h } else { 0.0 };
-            diagonal - jacobian[(i, j)]
-        });
-        let stage = |f: &Whole, others: &Whole| -> Option<Whole> {
-            let right: Vec<f64> = (0..4).map(|i| f[i] + others[i] / h).collect();
-            matrix.solve(&right)?.try_into().ok()
+    /// The energy of the elbow about the place in which the spring carries the load of the swing \[J\]. That place moves.
+    fn energy(&self, state: &State<2>) -> f64 {
+        /// A time in which the load changes in proportion \[s\].
+        const INSTANT: f64 = 1e-6;
+        let arm = &self.control.arm;
+        let ([q, elbow], [v, speed]) = (state.position, state.velocity);
+        let load = balance(arm, state);
+        let [a, _] = forward_dynamics(arm, &state.position, &[v, 0.0], &[0.0, load]);
+        let later = State {
+            position: [q + INSTANT * v, elbow],
+            velocity: [v + INSTANT * a, 0.0],
         };
-        let k1 = stage(&start, &[0.0; 4])?;
-        let k2 = stage(&start, &k1.map(|k| 4.0 * k))?;
-        let f3 = self.slope(&moved(&y, 2.0, &k1));
-        let k3 = stage(&f3, &std::array::from_fn(|i| k1[i] - k2[i]))?;
-        let ahead = moved(&moved(&y, 2.0, &k1), 1.0, &k3);
-        let f4 = self.slope(&ahead);
-        let others = std::array::from_fn(|i| k1[i] - k2[i] - 8.0 / 3.0 * k3[i]);
-        let k4 = stage(&f4, &others)?;
-        Some(std::array::from_fn(|i| 2.0 * k1[i] + k3[i] + k4[i]))
+        let (kp, target) = (self.control.gains.kp[1], self.control.setpoint.position[1]);
+        let off = elbow + load / kp - target;
+        let speed = speed + (balance(arm, &later) - load) / INSTANT / kp;
+        0.5 * (speed * speed / rates(*arm).1 + kp * off * off)
     }
+}
+
+/// The effort that keeps the elbow from accelerating \[N m\].
+fn balance(arm: &Arm<2>, state: &State<2>) -> f64 {
+    let velocity = [state.velocity[0], 0.0];
+    let at = |effort| forward_dynamics(arm, &state.position, &velocity, &[0.0, effort])[1];
+    at(0.0) / (at(0.0) - at(1.0))
 }

@@ -1,11 +1,13 @@
-//! A motion that several solvers compute, each in any number of equal steps, and the error and the cost of every run.
+//! A motion that several solvers compute, and the error and the cost of every run.
 //!
 //! The error of a run is its largest distance to one reference, over all steps, or over as many of them as the task
 //! says. Its cost is counted in evaluations of the dynamics. For seconds, time [`Task::replay`], which takes the same
 //! steps and does no more.
 //!
-//! **Invariant:** nothing is chosen per solver: same start, same timesteps, same reference, same measure.
+//! **Invariant:** nothing is chosen per solver: same start, same reference, same measure, and for solvers with equal
+//! steps the same timesteps.
 
+use super::reference::DoubleDouble;
 use crate::math::count::in_f64;
 use crate::study::beside::Steppable;
 use crate::study::fewest::fewest;
@@ -17,9 +19,9 @@ pub const LOST: f64 = std::f64::consts::TAU;
 /// The outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RunOutcome {
-    /// Steps that were to be taken.
+    /// Steps that were to be taken; of a solver with a tolerance, those that it took.
     pub steps: u64,
-    /// Length of each \[s\].
+    /// Length of each \[s\], or their mean.
     pub timestep: f64,
     /// Evaluations of the dynamics, counted.
     pub evaluations: u64,
@@ -31,19 +33,25 @@ pub struct RunOutcome {
 
 /// A run of a task, step by step.
 pub(super) trait TaskRun {
-    /// Takes up to `steps` steps. Returns how many it took before it left the finite numbers.
-    fn advance(&mut self, steps: u64) -> u64;
+    /// Takes up to `steps` steps. Returns whether the state is still finite.
+    fn advance(&mut self, steps: u64) -> bool;
     /// The joint angles \[rad\].
     fn place(&self) -> &[f64];
+    /// The joint rates \[rad/s\].
+    fn rates(&self) -> &[f64];
     /// Evaluations of the dynamics so far.
     fn evaluations(&self) -> u64;
+    /// Steps taken, and the time \[s\], of a solver that chooses its steps.
+    fn chosen(&self) -> Option<(u64, f64)> {
+        None
+    }
 }
 
 /// Makes the run of a solver with this number of steps ready.
-type Ready<S> = dyn Fn(S, u64) -> Box<dyn TaskRun>;
+pub(super) type Ready<S> = dyn Fn(S, u64) -> Box<dyn TaskRun>;
 
-/// The distance of a place to the reference after this number of steps, of this number in all.
-type Distance = dyn Fn(u64, u64, &[f64]) -> f64;
+/// The distance of a place to the reference at a time \[s\].
+type Distance = dyn Fn(DoubleDouble, &[f64]) -> f64;
 
 /// A motion to be computed by solvers `S`.
 pub struct Task<S> {
@@ -59,25 +67,31 @@ pub struct Task<S> {
     pub(super) distance: Box<Distance>,
 }
 
-impl<S: Copy> Task<S> {
-    /// Takes `steps` steps and compares. A run whose error exceeds `most` ends there and counts as lost.
+impl<S: Clone> Task<S> {
+    /// Takes `steps` steps and compares. A run whose error exceeds `most` ends there and counts as lost. A solver that
+    /// chooses its steps may try as many, and is lost if they do not reach the end.
     pub fn run(&self, solver: S, steps: u64, most: f64) -> RunOutcome {
         let every = steps.div_ceil(self.looks).max(1);
         let mut run = (self.ready)(solver, steps);
-        let (mut done, mut error) = (0, 0.0_f64);
-        while error.is_finite() && done < steps {
+        let timestep = self.duration / in_f64(steps);
+        let (mut done, mut error, mut is_over) = (0, 0.0_f64, false);
+        while error.is_finite() && !is_over {
             let due = every.min(steps - done);
-            let taken = run.advance(due);
-            done += taken;
-            let off = (self.distance)(done, steps, run.place());
+            let is_finite = run.advance(due);
+            done += due;
+            let equal = || DoubleDouble::from(timestep) * in_f64(done);
+            let chosen = run.chosen().map(|(_, time)| time);
+            let off = (self.distance)(chosen.map_or_else(equal, DoubleDouble::from), run.place());
+            is_over = chosen.map_or(done == steps, |time| time >= self.duration);
             // NaN is lost too.
-            let is_known = taken == due && off <= most;
+            let is_known = is_finite && off <= most && (is_over || done < steps);
             error = if is_known {
                 error.max(off)
             } else {
                 f64::INFINITY
             };
         }
+        let steps = run.chosen().map_or(steps, |(taken, _)| taken);
         RunOutcome {
             steps,
             timestep: self.duration / in_f64(steps),
@@ -98,7 +112,7 @@ impl<S: Copy> Task<S> {
     ) -> Option<RunOutcome> {
         let mut best = None;
         at_once(fewest(first, last / self.unit, part, |units| {
-            let made = self.run(solver, units * self.unit, most);
+            let made = self.run(solver.clone(), units * self.unit, most);
             let is_enough = made.error <= most;
             best = is_enough.then_some(made).or(best);
             is_enough
@@ -115,12 +129,16 @@ impl<S: Copy> Task<S> {
 }
 
 impl<const N: usize> TaskRun for Box<dyn Steppable<N>> {
-    fn advance(&mut self, steps: u64) -> u64 {
-        (**self).advance(steps)
+    fn advance(&mut self, steps: u64) -> bool {
+        (**self).advance(steps) == steps
     }
 
     fn place(&self) -> &[f64] {
         &self.state().position
+    }
+
+    fn rates(&self) -> &[f64] {
+        &self.state().velocity
     }
 
     fn evaluations(&self) -> u64 {

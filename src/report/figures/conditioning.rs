@@ -82,8 +82,11 @@ pub(super) fn make(section: &mut Section) {
              mass matrix far more",
             number(straight)
         ),
-        &format!("Worst of {count} random states for each mark. Links of 1 m, two of 1 kg, under gravity. The dashed line is the change of the accelerations by the last bit of an angle. An \
-         algorithm below it loses less than the angles do. Crosses at the top: elimination failed."),
+        &format!(
+            "Worst of {count} random states for each mark. Links of 1 m, two of 1 kg, under gravity. The dashed line is \
+             the change of the accelerations by the last bit of an angle. An algorithm below it loses less than the \
+             angles do. Crosses at the top: elimination failed."
+        ),
         &panels,
     );
 }

@@ -4,6 +4,7 @@
 
 mod budget;
 mod conditioning;
+mod design;
 mod drift;
 mod error;
 mod fit;
@@ -48,6 +49,7 @@ pub(crate) const SECTIONS: &[Maker] = &[
     untimed("nonlinear", "Stability of large motions", nonlinear::make),
     timed("stiff", "Stiffness and explicit methods", stiff::make),
     untimed("scenarios", "Stiff and extreme scenes", scenarios::make),
+    untimed("design", "Control designed for its period", design::make),
     untimed("budget", "Parts of the error", budget::make),
     untimed("drift", "Energy over long swings", drift::make),
     untimed("conditioning", "Uneven arms", conditioning::make),

@@ -5,7 +5,7 @@
 use crate::report::experiments::scenarios;
 use crate::report::scenes::{LiveScene, live_scenes};
 use crate::report::section::{Cell, Section, Table, verdict};
-use crate::report::svg::{Axis, Curve, Form, Key, Plot, Thumbnail, number, plain, seconds};
+use crate::report::svg::{Axis, Curve, Key, Plot, Thumbnail, number, plain, seconds};
 use crate::study::matrix::largest;
 
 pub(super) fn make(section: &mut Section) {
@@ -107,7 +107,7 @@ fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Plot {
         ),
         Err(why) => (String::new(), why),
     };
-    plot.form = Form::Thumbnail(Thumbnail {
+    plot.thumbnail = Some(Thumbnail {
         link,
         note,
         verdict: verdict(holds),

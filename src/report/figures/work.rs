@@ -9,25 +9,7 @@
 use std::collections::HashMap;
 
 use crate::report::section::{Cell, Section, Table};
-use crate::report::svg::{Plot, number};
-
-/// Steps whose instructions are drawn.
-const STEPS: [&str; 14] = [
-    "step-2-euler-free",
-    "step-2-midpoint-free",
-    "step-2-verlet-free",
-    "step-2-rk4-free",
-    "step-2-rk4-weightless",
-    "step-2-rk4-pd",
-    "step-2-rk4-pi",
-    "step-2-rk4-pushed",
-    "step-2-rk4-pid",
-    "step-3-rk4-free",
-    "step-3-rk4-weightless",
-    "step-3-rk4-pid",
-    "particle-rk4-constant",
-    "particle-rk4-cosine",
-];
+use crate::report::svg::number;
 
 /// The counts of the kept report. The first line has the version and the processor.
 const KEPT: &str = include_str!("../../../docs/report/work.csv");
@@ -51,7 +33,6 @@ pub(super) fn make(section: &mut Section) {
         counts: counts.collect(),
         with: with.unwrap_or_default().to_owned(),
     };
-    measured.figure(section);
     section.table(&measured.table());
     measured.findings(section);
     measured.verdicts(section);
@@ -109,8 +90,12 @@ impl Measured {
         let mut table = Table::new(
             "left-out",
             "Work that is left out, and its measured cost",
-            "Instructions are counted by callgrind over the same number of steps on both sides, without the start of \
-             the program.",
+            format!(
+                "Instructions are counted by callgrind, with {}, over the same number of steps on both sides, without \
+                 the start of the program. The server: 2 links, RK4 at 1 ms, controller off, 4 s of real time; \
+                 subscribers of /joint_states over TCP.",
+                self.with
+            ),
             lines.next().into_iter().flatten(),
         );
         let count = |told: &str| self.count(told.split(": ").next()?);
@@ -130,37 +115,6 @@ impl Measured {
             ]);
         }
         table
-    }
-
-    /// Bars of the instructions of a step and of the server.
-    fn figure(&self, section: &mut Section) {
-        let counts = STEPS.map(|name| (name, self.count(name).map(f64::round)));
-        let server = [
-            ("paused", "server-paused"),
-            ("running, nobody listens", "server-running"),
-            ("1 subscriber", "server-1-subscriber"),
-            ("11 subscribers", "server-11-subscribers"),
-        ];
-        let server = server.map(|(label, name)| (label, self.count(name).map(|n| n / 1e6)));
-        let allocations = self.count("allocations-in-steps").map_or_else(
-            || "Allocations were not counted.".to_owned(),
-            |count| format!("Allocations in these steps: {}.", number(count)),
-        );
-        section.figure(
-            "left-out",
-            "Work of a step and of the server, scene by scene",
-            &format!(
-                "Instructions by callgrind, counted with {}. step: links, method, law. The law is free (none), weightless \
-                 (none, no gravity), one with the named gains, or pushed (pid with a disturbance of zeros). particle: \
-                 the 1-DOF service under a constant force or a cosine. The server: 2 links, RK4 at 1 ms, controller off, \
-                 4 s of real time; subscribers of /joint_states over TCP. {allocations}",
-                self.with
-            ),
-            &[
-                Plot::bars("Instructions per step", "c1", counts),
-                Plot::bars("The server: million instructions per second", "c3", server),
-            ],
-        );
     }
 
     /// Messages encoded per second, and the instructions per message.

@@ -12,7 +12,7 @@ mod plot;
 
 pub use axis::{Axis, Unit};
 pub(crate) use numbers::{number, one_digit, plain, power, scientific, seconds};
-pub(crate) use plot::{Form, Thumbnail};
+pub(crate) use plot::Thumbnail;
 pub use plot::{Plot, csv};
 
 use crate::math::count::length_in_f64;
@@ -76,7 +76,11 @@ impl Key {
         use Marker::{Circle, Diamond, Square, Triangle};
         let markers = [Circle, Square, Triangle, Diamond];
         let marker = markers.get(method as usize).copied().unwrap_or(Circle);
-        Self::line(method.name(), method.name()).marked(marker)
+        let label = match method {
+            Method::Verlet => "verlet, a predictor-corrector with a velocity guess",
+            _ => method.name(),
+        };
+        Self::line(method.name(), label).marked(marker)
     }
 
     /// A method's prediction: dashed, with hollow marks, and not in the legend.
@@ -129,6 +133,8 @@ pub struct Point {
     pub(crate) y: f64,
     /// A note that is not on the axes; often empty.
     pub(crate) note: String,
+    /// Ends of a horizontal line through it.
+    pub(crate) spread: Option<(f64, f64)>,
 }
 
 impl Point {
@@ -137,6 +143,7 @@ impl Point {
             x,
             y,
             note: note.into(),
+            spread: None,
         }
     }
 }

@@ -1,8 +1,8 @@
-//! One panel: axes and curves, or horizontal bars.
+//! One panel: axes and curves.
 //!
 //! **Invariant:** lines break at lost points, which are drawn at the upper edge.
 
-use super::{Axis, Curve, HEIGHT, Key, Marker, Point, Unit, WIDTH, escape, lines, number};
+use super::{Axis, Curve, HEIGHT, Key, Marker, Point, WIDTH, escape, lines};
 use crate::math::count::length_in_f64;
 
 /// Left, right, upper and lower ends of the axes in a panel, and in a thumbnail of half its size.
@@ -15,21 +15,9 @@ pub struct Plot {
     pub(crate) title: String,
     pub(crate) x: Axis,
     pub(crate) y: Axis,
-    /// A second scale above: its unit on x, and its name.
-    pub(crate) above: Option<(f64, &'static str)>,
-    pub(crate) form: Form,
+    /// Its texts, if it has half the size and no scales.
+    pub(crate) thumbnail: Option<Thumbnail>,
     pub(crate) curves: Vec<Curve>,
-}
-
-/// The form of a panel.
-#[derive(Debug, Clone)]
-pub(crate) enum Form {
-    /// Axes with scales, and curves.
-    Scales,
-    /// Curves of half the size, without scales.
-    Thumbnail(Thumbnail),
-    /// A horizontal bar for each curve, with its label and its number.
-    Bars,
 }
 
 /// The texts of a thumbnail.
@@ -50,30 +38,8 @@ impl Plot {
             title: title.into(),
             x,
             y,
-            above: None,
-            form: Form::Scales,
+            thumbnail: None,
             curves: Vec::new(),
-        }
-    }
-
-    /// Horizontal bars from zero, each with its number; a row without a number is marked.
-    pub fn bars(
-        title: &'static str,
-        class: &'static str,
-        rows: impl IntoIterator<Item = (&'static str, Option<f64>)>,
-    ) -> Self {
-        let rows = rows.into_iter();
-        let bars = rows.map(|(label, value)| {
-            let value = (value.unwrap_or(f64::NAN), f64::NAN);
-            Curve::line(Key::line(class, label), [value])
-        });
-        let (x, y) = (
-            Axis::linear(title, (0.0, 1.0)),
-            Axis::linear("", (0.0, 1.0)),
-        );
-        Self {
-            form: Form::Bars,
-            ..Self::new(title, x, y).with(bars)
         }
     }
 
@@ -88,18 +54,8 @@ impl Plot {
         self.curves.push(curve);
     }
 
-    /// The keys that its legend explains.
-    pub(crate) fn keys(&self) -> impl Iterator<Item = &Key> {
-        let is_named = !matches!(self.form, Form::Bars);
-        let curves = self.curves.iter().filter(move |_| is_named);
-        curves.map(|curve| &curve.key)
-    }
-
     fn ends(&self) -> [f64; 4] {
-        match self.form {
-            Form::Thumbnail(_) => SMALL_ENDS,
-            _ => ENDS,
-        }
+        self.thumbnail.as_ref().map_or(ENDS, |_| SMALL_ENDS)
     }
 
     fn across(&self, value: f64) -> f64 {
@@ -114,14 +70,13 @@ impl Plot {
 
     /// The panel as it is shown: an `<svg>` element without style.
     pub(crate) fn svg(&self) -> String {
-        let curves = || self.curves.iter().map(|curve| self.curve(curve));
-        let (scale, drawn) = match &self.form {
-            Form::Scales => (1.0, self.frame() + &curves().collect::<String>()),
-            Form::Thumbnail(words) => (0.5, self.words(words) + &curves().collect::<String>()),
-            Form::Bars => (1.0, self.drawn_bars()),
+        let curves: String = self.curves.iter().map(|curve| self.curve(curve)).collect();
+        let (scale, frame) = match &self.thumbnail {
+            None => (1.0, self.frame()),
+            Some(words) => (0.5, self.words(words)),
         };
         format!(
-            "<svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">{drawn}</svg>",
+            "<svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">{frame}{curves}</svg>",
             scale * WIDTH,
             scale * HEIGHT,
             escape(&self.title),
@@ -183,15 +138,6 @@ impl Plot {
             out += &format!("<path class=\"grid\" d=\"M{left} {y:.1}H{right}\"/>");
             out += &text("label", (left - 6.0, y + 4.0), "end", &label);
         }
-        if let Some((unit, name)) = self.above {
-            out += &text("note", (WIDTH - 3.0, 17.0), "end", name);
-            let other = Axis::log("", Unit::Number, (self.x.min / unit, self.x.max / unit));
-            for (value, label) in other.ticks(5.0) {
-                let x = self.across(value * unit);
-                out += &format!("<path class=\"frame\" d=\"M{x:.1} {top}v-4\"/>");
-                out += &text("note", (x, top - 7.0), "middle", &label);
-            }
-        }
         let middle = (f64::midpoint(left, right), HEIGHT - 10.0);
         out += &format!("<path class=\"frame\" d=\"M{left} {top}V{bottom}H{right}\"/>");
         out += &text("axis", middle, "middle", self.x.label);
@@ -222,6 +168,12 @@ impl Plot {
                     letter = 'L';
                 } else {
                     letter = 'M';
+                }
+            }
+            for point in &curve.points {
+                if let Some((low, high)) = point.spread.filter(|_| point.y.is_finite()) {
+                    let (x, y) = (self.across(low), self.down(point.y));
+                    path += &format!("M{x:.1} {y:.1}H{:.1}", self.across(high));
                 }
             }
             out += &format!("<path class=\"line\" d=\"{path}\"/>");
@@ -266,36 +218,6 @@ impl Plot {
         let words = words.map(escape).join("; ");
         let tooltip = words.trim_end_matches("; ");
         format!("<path class=\"{class}\" d=\"{path}\"><title>{tooltip}</title></path>")
-    }
-
-    fn drawn_bars(&self) -> String {
-        const LEFT: f64 = 176.0;
-        const TOP: f64 = 34.0;
-        let value = |curve: &Curve| curve.points.first().map_or(f64::NAN, |point| point.x);
-        let values = self.curves.iter().map(value);
-        let largest = values.fold(f64::MIN_POSITIVE, f64::max);
-        let pitch = (HEIGHT - TOP - 10.0) / length_in_f64(self.curves.len().max(1));
-        let thick = (0.68 * pitch).min(26.0);
-        let mut middle = TOP + 0.5 * pitch;
-        let mut out = text("title", (14.0, 17.0), "start", &self.title);
-        for curve in &self.curves {
-            let value = value(curve);
-            let width = value.max(0.0) / largest * (WIDTH - LEFT - 58.0);
-            let said = if value.is_nan() {
-                "not measured".to_owned()
-            } else {
-                number(value)
-            };
-            out += &text("label", (LEFT - 6.0, middle + 4.0), "end", &curve.key.label);
-            out += &format!(
-                "<rect class=\"bar {}\" x=\"{LEFT}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{thick:.1}\"/>",
-                curve.key.class,
-                middle - 0.5 * thick
-            );
-            out += &text("label", (LEFT + width + 5.0, middle + 4.0), "start", &said);
-            middle += pitch;
-        }
-        out
     }
 }
 

@@ -82,6 +82,11 @@ impl Given {
         &self.pair
     }
 
+    /// The embedded method.
+    pub(crate) const fn embedded(&self) -> Option<&Pair> {
+        self.embedded.as_ref()
+    }
+
     /// The same with the times of the stages, to which the rows of `a` are compared.
     ///
     /// # Errors

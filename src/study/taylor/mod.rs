@@ -302,6 +302,21 @@ impl<const N: usize> TaylorReference<N> {
         self.0.coefficients
     }
 
+    /// The same motion at the start of a span \[s\].
+    #[cfg(feature = "report")]
+    #[must_use]
+    pub(crate) fn begun(mut self, span: f64) -> Self {
+        self.0.begin(span);
+        self
+    }
+
+    /// Takes a step of the span under `effort` \[N m\], without friction. Returns the rest of the span \[s\].
+    #[cfg(feature = "report")]
+    pub(crate) fn step(&mut self, arm: &Arm<N>, effort: &[f64; N]) -> f64 {
+        self.0.step(arm, effort);
+        self.0.rest.0
+    }
+
     /// Follows the arm under `effort` \[N m\] for `span` \[s\]; `false` if the motion could not be computed. The state
     /// is then somewhere within the span.
     pub fn follow(&mut self, arm: &Arm<N>, effort: &[f64; N], span: f64) -> bool {

@@ -18,7 +18,7 @@ const LAYERS: [(&str, &[&str]); 22] = [
     ("live", &["math", "protocol", "services", "study"]),
     ("record", &["math", "protocol"]),
     ("web", &["protocol", "address", "value"]),
-    ("report", &["math", "study"]),
+    ("report", &["math", "protocol", "services", "study"]),
     (
         "command",
         &["protocol", "output", "address", "value", "signals"],

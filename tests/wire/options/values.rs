@@ -1,6 +1,8 @@
 //! Options: values that are accepted, and values that are refused by name and value.
 //! `tests/house/readme/mod.rs` has the options of `--help`, their variables and defaults.
 
+use std::path::Path;
+
 use super::{options, parse, refusal};
 use pendularm::logging::LogFormat;
 use pendularm::options::{DEFAULT_BIND, Links, Parsed};
@@ -164,6 +166,9 @@ fn a_report_is_asked_for_with_its_directory_its_sections_and_its_haste() {
     assert_eq!((plain.out.to_str(), plain.quick), (Some("report"), false));
     assert!(plain.only.is_empty());
     let all = report(&["--out", "here", "--only", "error,budget", "--quick"]);
+    let own = report(&["--method", "heun.json"]).method;
+    assert_eq!(own.as_deref().and_then(Path::to_str), Some("heun.json"));
+    assert!(plain.method.is_none());
     assert_eq!((all.out.to_str(), all.quick), (Some("here"), true));
     assert_eq!(all.only, ["error", "budget"]);
 }
