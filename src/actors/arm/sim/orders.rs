@@ -7,14 +7,14 @@
 use actix::prelude::*;
 
 use super::messages::{
-    ArmPose, CommandEffort, CommandGoal, EndGoal, MoveSetpoint, SetListener, SetSetpoint,
-    SimulationTime, TakeSnapshot, TrackGoal,
+    ArmPose, CommandEffort, CommandGoal, EndGoal, SetListener, SetSetpoint, SimulationTime,
+    TakeSnapshot, TrackGoal,
 };
 use super::node::ArmSim;
 use crate::actors::node::{Nodes, TopicMessage};
-use crate::live::{GoalProgress, Journal, Pose, Tracking};
+use crate::live::{GoalProgress, Journal, MoveSetpoint, Pose, Tracking};
 use crate::math::kinematics::Unreachable;
-use crate::math::simulation::{ArmInput, Simulation};
+use crate::math::simulation::Simulation;
 use crate::protocol::catalog::Topic;
 use crate::services::arm::read_effort;
 use crate::services::trajectory::read_setpoint;
@@ -94,11 +94,7 @@ impl<const N: usize> ArmOrder<N> for SetSetpoint<N> {
 
 impl<const N: usize> ArmOrder<N> for MoveSetpoint<N> {
     fn perform(self, node: &mut ArmSim<N>) -> Result<(), u64> {
-        if *node.arm.simulation.pid().setpoint() != self.from {
-            return Err(node.arm.pose().resets);
-        }
-        node.arm.change(ArmInput::Setpoint(self.to));
-        Ok(())
+        node.arm.move_setpoint(self)
     }
 }
 
