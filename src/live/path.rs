@@ -8,8 +8,6 @@
 
 use std::time::Duration;
 
-use serde_json::Value;
-
 #[cfg(doc)]
 use super::goals::Obstacle;
 use super::goals::Pose;
@@ -20,7 +18,9 @@ use crate::math::pid::Setpoint;
 use crate::math::simulation::ArmInput;
 use crate::math::trajectory::{JointPath, PathTask, Standing, Waypoint};
 use crate::protocol::op::GoalStatus;
-use crate::services::trajectory::{FollowPath, ResultCode, path_feedback, path_result};
+use crate::services::trajectory::{
+    FollowPath, PathMessage, ResultCode, path_feedback, path_result,
+};
 
 /// Time between two moves of the setpoint, which the arm holds in between. At 1 rad/s the setpoint is some millimetres
 /// behind the path.
@@ -52,7 +52,7 @@ pub struct PathMove<const N: usize> {
     /// The move, also at the end of the path.
     pub setpoint: MoveSetpoint<N>,
     /// Feedback, if it is due and wanted.
-    pub feedback: Option<Value>,
+    pub feedback: Option<PathMessage>,
     /// The end of the path, after the move.
     pub end: Option<PathEnd>,
 }
@@ -63,7 +63,7 @@ pub struct PathEnd {
     /// The status of the goal.
     pub status: GoalStatus,
     /// The result of the goal.
-    pub result: Value,
+    pub result: PathMessage,
 }
 
 impl PathEnd {

@@ -4,6 +4,7 @@
 //! **Invariant:** every setpoint and point has a finite position of each joint, in the arm's order. Every error names
 //! its field.
 
+use serde::Serialize;
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
@@ -134,6 +135,10 @@ impl<const N: usize> FollowPath<N> {
     }
 }
 
+/// Feedback or result of the action, in JSON.
+#[derive(Debug, Serialize)]
+pub struct PathMessage(Value);
+
 /// The result codes of the action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ResultCode {
@@ -149,8 +154,8 @@ pub enum ResultCode {
 
 /// `control_msgs/action/FollowJointTrajectory_Result`.
 #[must_use]
-pub fn path_result(code: ResultCode, why: &str) -> Value {
-    json!({"error_code": code as i32, "error_string": why})
+pub fn path_result(code: ResultCode, why: &str) -> PathMessage {
+    PathMessage(json!({"error_code": code as i32, "error_string": why}))
 }
 
 /// `control_msgs/action/FollowJointTrajectory_Feedback` at simulation time `now`, `time` after the start \[s\].
@@ -160,7 +165,7 @@ pub fn path_feedback<const N: usize>(
     time: f64,
     desired: &Setpoint<N>,
     actual: &State<N>,
-) -> Value {
+) -> PathMessage {
     let time_from_start = Stamp::from_seconds(time);
     let point = |positions: [f64; N], velocities: [f64; N]| {
         json!({
@@ -176,7 +181,7 @@ pub fn path_feedback<const N: usize>(
         off.iter_mut().zip(is).for_each(|(off, is)| *off -= is);
         off
     };
-    json!({
+    PathMessage(json!({
         "header": Header::world(now),
         "joint_names": joint_names::<N>().as_slice(),
         "desired": point(desired.position, desired.velocity),
@@ -185,7 +190,7 @@ pub fn path_feedback<const N: usize>(
             off(desired.position, actual.position),
             off(desired.velocity, actual.velocity),
         ),
-    })
+    }))
 }
 
 fn points<const N: usize>(trajectory: &RawValue) -> Result<Vec<Waypoint<N>>, RejectedField> {

@@ -10,10 +10,10 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 
-use crate::actors::arm::sim::{ArmSim, CommandGoal, EndGoal, GoalProgress, TrackGoal};
+use crate::actors::arm::sim::{ArmSim, CommandGoal, EndGoal, GoalProgress, Obstacle, TrackGoal};
 use crate::actors::node::{
-    ActionClient, Ask, Asker, Barrier, Call, Callable, CancelSent, ForwardGoal, Goal, Nodes,
-    Publish, Reply, ShutDown, Unserved, Working,
+    ActionClient, Ask, Barrier, Call, CancelSent, ForwardGoal, Goal, Nodes, Publish, ShutDown,
+    Unserved,
 };
 pub use crate::live::GoalReport;
 use crate::live::{IkGoals, cancelled};
@@ -44,6 +44,9 @@ enum GoalOwner<const N: usize> {
     /// A client that sent it by the action.
     Client(Arc<ActionClient>),
 }
+
+/// A goal that the arm tracks, and the reason why it does not move yet.
+type Begun<const N: usize> = Result<(AcceptedGoal<N>, Option<Obstacle>), Unreachable>;
 
 /// The messages to the arm for goals.
 #[derive(Clone)]
@@ -86,34 +89,26 @@ impl<const N: usize> IkAction<N> {
         nodes.serve_action::<GoalRequest<N>, _>(address.clone());
     }
 
-    /// Starts a goal. Its sender is answered before it is set in motion.
-    fn start_goal(
-        &mut self,
+    /// The arm begins the goal, in place of the previous one. Answer its sender, then call [`Self::set_in_motion`].
+    fn begin(
+        &self,
         goal: GoalRequest<N>,
         owner: GoalOwner<N>,
-        mut reply: Reply<Result<String, Unreachable>>,
-        ctx: &mut Context<Self>,
-    ) {
+        ctx: &Context<Self>,
+    ) -> impl ActorFuture<Self, Output = Result<Begun<N>, Unserved>> + use<N> {
         let order = self.goals.order(goal);
-        let begun = self.arm.track.send(TrackGoal {
+        let tracking = self.arm.track.send(TrackGoal {
             goal: order,
             owner: ctx.address().recipient(),
         });
-        ctx.wait(begun.into_actor(self).map(move |tracking, node, _| {
-            let tracking = match tracking {
-                Ok(Ok(tracking)) => tracking,
-                Ok(Err(why)) => return reply.conclude(Err(why)),
-                Err(_) => return reply.refuse(Unserved::NO_ARM),
-            };
-            if let Some(obstacle) = tracking.obstacle {
-                reply.warn(&obstacle.to_string());
-            }
-            let (before, goal) = node.goals.accept(&order, owner, &tracking);
-            node.pass_on(before, GoalStatus::Aborted);
-            reply.answer(Ok(goal.id.clone()));
-            node.set_in_motion(goal);
-            drop(reply);
-        }));
+        tracking.into_actor(self).map(move |tracking, node, _| {
+            let tracking = tracking.map_err(|_| Unserved::NO_ARM)?;
+            Ok(tracking.map(|tracking| {
+                let (before, goal) = node.goals.accept(&order, owner, &tracking);
+                node.pass_on(before, GoalStatus::Aborted);
+                (goal, tracking.obstacle)
+            }))
+        })
     }
 
     /// Sends the goal's setpoint to the subscribers, and then to the arm.
@@ -170,16 +165,14 @@ impl<const N: usize> IkAction<N> {
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// A goal of the trial. The answer is its id, sent before its trajectory is published.
+/// A goal of the trial. The answer is its id; `None` if it is refused.
+#[derive(Message)]
+#[rtype(result = "Option<String>")]
 pub struct SendGoal<const N: usize> {
     /// The goal.
     pub goal: GoalRequest<N>,
     /// The receiver of feedback besides the subscribers. It may end at any time.
     pub owner: Recipient<GoalReport<N>>,
-}
-
-impl<const N: usize> Ask for SendGoal<N> {
-    type Answer = Result<String, Unreachable>;
 }
 
 /// For the owner in its [`SendGoal`].
@@ -191,28 +184,7 @@ impl<const N: usize> Goal for GoalRequest<N> {
     const ACTION: Action = Action::MoveTo;
 
     fn read(arguments: &Arguments) -> Result<Self, Rejections> {
-        <Self as Callable>::read(Service::SendGoal, arguments)
-    }
-}
-
-/// A client that has sent a goal by the action. Feedback shows that it was accepted.
-struct GoalSender(Arc<ActionClient>);
-
-impl Asker<Result<String, Unreachable>> for GoalSender {
-    fn answer(
-        self: Box<Self>,
-        answer: Result<Result<String, Unreachable>, Unserved>,
-        _: Option<Working>,
-    ) {
-        match answer {
-            Ok(Ok(_)) => {}
-            Ok(Err(why)) => self.0.refuse(&why.to_string()),
-            Err(why) => self.0.refuse(&why.to_string()),
-        }
-    }
-
-    fn warn(&self, why: &str) {
-        self.0.warn(why);
+        <Self as Ask>::read(Service::SendGoal, arguments)
     }
 }
 
@@ -227,22 +199,44 @@ impl<const N: usize> Actor for IkAction<N> {
 impl<const N: usize> Handler<Call<GoalRequest<N>>> for IkAction<N> {
     type Result = ();
 
-    fn handle(&mut self, Call { ask, reply }: Call<GoalRequest<N>>, ctx: &mut Context<Self>) {
-        self.start_goal(ask, GoalOwner::Subscribers, reply, ctx);
+    fn handle(&mut self, Call { ask, mut reply }: Call<GoalRequest<N>>, ctx: &mut Context<Self>) {
+        let begun = self.begin(ask, GoalOwner::Subscribers, ctx);
+        ctx.wait(begun.map(move |begun, node, _| match begun {
+            Ok(Ok((goal, obstacle))) => {
+                if let Some(obstacle) = obstacle {
+                    reply.warn(&obstacle.to_string());
+                }
+                reply.answer(Ok(goal.id.clone()));
+                node.set_in_motion(goal);
+            }
+            Ok(Err(why)) => reply.conclude(Err(why)),
+            Err(why) => reply.refuse(why),
+        }));
     }
 }
 
-impl<const N: usize> Handler<Call<SendGoal<N>>> for IkAction<N> {
-    type Result = ();
+impl<const N: usize> Handler<SendGoal<N>> for IkAction<N> {
+    type Result = AtomicResponse<Self, Option<String>>;
 
-    fn handle(&mut self, Call { ask, reply }: Call<SendGoal<N>>, ctx: &mut Context<Self>) {
-        self.start_goal(ask.goal, GoalOwner::Node(ask.owner), reply, ctx);
+    fn handle(
+        &mut self,
+        SendGoal { goal, owner }: SendGoal<N>,
+        ctx: &mut Context<Self>,
+    ) -> Self::Result {
+        let begun = self.begin(goal, GoalOwner::Node(owner), ctx);
+        AtomicResponse::new(Box::pin(begun.map(|begun, node, _| {
+            let (goal, _) = begun.ok()?.ok()?;
+            let id = goal.id.clone();
+            node.set_in_motion(goal);
+            Some(id)
+        })))
     }
 }
 
 impl<const N: usize> Handler<ForwardGoal<GoalRequest<N>>> for IkAction<N> {
     type Result = ();
 
+    /// Feedback shows the client that its goal was accepted.
     fn handle(&mut self, forwarded: ForwardGoal<GoalRequest<N>>, ctx: &mut Context<Self>) {
         let ForwardGoal {
             goal,
@@ -250,8 +244,20 @@ impl<const N: usize> Handler<ForwardGoal<GoalRequest<N>>> for IkAction<N> {
             working,
         } = forwarded;
         let client = Arc::new(client);
-        let reply = Reply::new(GoalSender(Arc::clone(&client)), Some(working));
-        self.start_goal(goal, GoalOwner::Client(client), reply, ctx);
+        let begun = self.begin(goal, GoalOwner::Client(Arc::clone(&client)), ctx);
+        ctx.wait(begun.map(move |begun, node, _| {
+            match begun {
+                Ok(Ok((goal, obstacle))) => {
+                    if let Some(obstacle) = obstacle {
+                        client.warn(&obstacle.to_string());
+                    }
+                    node.set_in_motion(goal);
+                }
+                Ok(Err(why)) => client.refuse(&why.to_string()),
+                Err(why) => client.refuse(&why.to_string()),
+            }
+            drop(working);
+        }));
     }
 }
 

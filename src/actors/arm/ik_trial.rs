@@ -270,7 +270,7 @@ pub struct TrialArm<const N: usize> {
 #[derive(Clone)]
 pub struct GoalClient<const N: usize> {
     /// Sends a goal.
-    pub send: Recipient<Call<SendGoal<N>>>,
+    pub send: Recipient<SendGoal<N>>,
     /// Cancels it.
     pub cancel: Recipient<Call<CancelRequest>>,
     /// Waits until all earlier news have arrived.
@@ -301,7 +301,7 @@ async fn send_in_turn<const N: usize>(
                     goal: GoalRequest { target, criteria },
                     owner: owner.clone(),
                 };
-                let goal_id = ask(&goals.send, goal).await.ok().and_then(Result::ok);
+                let goal_id = goals.send.send(goal).await.ok().flatten();
                 let lengths = match goal_id {
                     Some(_) => None,
                     None => arm.send(ArmPose).await.ok().map(|pose| pose.lengths),

@@ -4,8 +4,7 @@
 //! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. The asker,
 //! a client or another node, is behind the [`Reply`].
 //!
-//! A question that clients can send defines its reader and the writer of its answer ([`Callable`], [`Answered`]). The
-//! table of routes ([`Nodes`]) defines the node. All errors on the way are handled here: invalid arguments, a dropped
+//! The question also has its reader and the writer of its answer. The table of routes ([`Nodes`]) defines the node. All errors on the way are handled here: invalid arguments, a dropped
 //! question, and the form of an error.
 //!
 //! **Invariant:** every [`Call`] is answered exactly once. A node parses no JSON.
@@ -26,4 +25,4 @@ pub use self::registry::{
     TakeCensus, Tap, Tapped,
 };
 pub use self::routes::{Attach, Nodes, Route};
-pub use crate::services::{Address, Answered, Ask, Callable};
+pub use crate::services::{Address, Ask};

@@ -14,7 +14,7 @@ use super::registry::Interest;
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::wire::json::Payload;
-use crate::services::Answered;
+use crate::services::Ask;
 
 /// Arguments longer than this are read on a worker thread. Numbers near the middle between two doubles take 5 µs for
 /// each 24 bytes, so these take a fifth of a millisecond. Usual ones are shorter.
@@ -39,7 +39,7 @@ pub struct Nodes {
 impl Nodes {
     /// The node serves `service`: it gets each call as this question. The arguments are read here, and rejected ones
     /// are reported.
-    pub fn serve<A: Answered>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
+    pub fn serve<A: Ask>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
         let node = node.into();
         let take = move |call: ServiceCall| {
             let node = node.clone();

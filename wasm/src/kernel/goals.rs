@@ -7,7 +7,7 @@ use pendularm::math::kinematics::Unreachable;
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages::Level;
 use pendularm::services::goals::{AcceptedGoal, CancelRejected, GoalRequest};
-use pendularm::services::{Address, Answered as _};
+use pendularm::services::{Address, Ask as _};
 
 use super::{GoalOwner, Kernel};
 

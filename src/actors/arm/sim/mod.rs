@@ -23,10 +23,10 @@ pub use crate::live::{
     ArmEvent, ArmListener, GoalOrder, GoalProgress, LEAST_PAUSE, MoveSetpoint, Obstacle,
     PUBLISH_RATE, Pose, REST_TICKS, STEP_PAUSE, StepEvent, Tracking, WAKE_UP_BUDGET,
 };
+pub use crate::services::Echo;
 pub use crate::services::arm::{
     Disturb, Enable, Integrator, MAX_STEPS, Pause, PeriodInForce, Push, Reset, STEPS_IN_A_ROW,
     SensorsInForce, SetFriction, SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod,
     SetSensors, SetState, Step, Stepped, StepsEnd, joint_names,
 };
 pub use crate::services::study::Present;
-pub use crate::services::{Echo, FieldByField};

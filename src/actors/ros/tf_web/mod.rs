@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 use tokio::time::Instant;
 
 use crate::actors::arm::sim::{ArmPose, Pose};
-use crate::actors::node::{ActionClient, Ask, Call, CancelSent, ForwardGoal, Publish, ShutDown};
+use crate::actors::node::{ActionClient, Call, CancelSent, ForwardGoal, Publish, ShutDown};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::scene::{TfMessage, seen_from};
 use crate::protocol::messages::{Empty, Header, Stamp};
@@ -45,10 +45,6 @@ const NOT_KEPT: &str = "id must be that of a goal of this connection";
 /// Requests the name of the topic with the frames. From clients, by `/republish_tfs`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RepublishTfs;
-
-impl Ask for RepublishTfs {
-    type Answer = ();
-}
 
 /// A client's request for frames of an arm of `N` links.
 pub struct FrameGoal<const N: usize> {
