@@ -12,7 +12,7 @@ use crate::protocol::messages;
 use crate::services::goals::{AcceptedGoal, CancelRejected, GoalRequest};
 
 /// The active goal with its owner: the receiver of its news besides the subscribers.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct IkGoals<const N: usize, O> {
     active: Option<(AcceptedGoal<N>, O)>,
     /// Goals accepted so far: their numbers make the ids.
@@ -26,15 +26,6 @@ pub struct GoalReport<const N: usize> {
     pub goal: AcceptedGoal<N>,
     /// Its progress, or its end.
     pub progress: GoalProgress<N>,
-}
-
-impl<const N: usize, O> Default for IkGoals<N, O> {
-    fn default() -> Self {
-        Self {
-            active: None,
-            accepted: 0,
-        }
-    }
 }
 
 impl<const N: usize, O: Clone> IkGoals<N, O> {

@@ -21,7 +21,6 @@ pub struct IkTrials<const N: usize> {
 }
 
 /// The answer of `ik_action` to a goal of the trial.
-#[derive(Debug)]
 pub struct GoalAnswer<const N: usize> {
     /// The ticket of the command.
     pub ticket: u64,
@@ -43,16 +42,10 @@ impl<const N: usize> IkTrials<N> {
         }
     }
 
-    /// Whether a trial runs.
+    /// The present trial.
     #[must_use]
-    pub const fn running(&self) -> bool {
-        self.trial.running()
-    }
-
-    /// Remaining simulation time of a running trial \[s\]; none when no trial runs.
-    #[must_use]
-    pub fn remaining(&self) -> Option<f64> {
-        self.trial.remaining()
+    pub const fn trial(&self) -> &Trial {
+        &self.trial
     }
 
     /// The message of `/ik_trial/status`; none before the first start.

@@ -11,11 +11,8 @@ use std::time::Duration;
 #[cfg(doc)]
 use super::goals::Obstacle;
 use super::goals::Pose;
-use super::{LiveArm, World};
-use crate::math::arm::State;
 use crate::math::goal::{Cadence, Dwell};
 use crate::math::pid::Setpoint;
-use crate::math::simulation::ArmInput;
 use crate::math::trajectory::{JointPath, PathTask, Standing, Waypoint};
 use crate::protocol::op::GoalStatus;
 use crate::services::trajectory::{
@@ -58,7 +55,6 @@ pub struct PathMove<const N: usize> {
 }
 
 /// The end of a path.
-#[derive(Debug)]
 pub struct PathEnd {
     /// The status of the goal.
     pub status: GoalStatus,
@@ -90,21 +86,15 @@ impl PathEnd {
     }
 
     fn of(standing: Standing) -> Option<Self> {
-        let (code, excess) = match standing {
+        use ResultCode::{GoalToleranceViolated, PathToleranceViolated, Successful};
+        let (status, code, why) = match standing {
             Standing::Moving => return None,
-            Standing::Arrived => {
-                return Some(Self {
-                    status: GoalStatus::Succeeded,
-                    result: path_result(ResultCode::Successful, ""),
-                });
-            }
-            Standing::OffPath(excess) => (ResultCode::PathToleranceViolated, excess),
-            Standing::Late(excess) => (ResultCode::GoalToleranceViolated, excess),
+            Standing::Arrived => (GoalStatus::Succeeded, Successful, String::new()),
+            Standing::OffPath(why) => (GoalStatus::Aborted, PathToleranceViolated, why.to_string()),
+            Standing::Late(why) => (GoalStatus::Aborted, GoalToleranceViolated, why.to_string()),
         };
-        Some(Self {
-            status: GoalStatus::Aborted,
-            result: path_result(code, &excess.to_string()),
-        })
+        let result = path_result(code, &why);
+        Some(Self { status, result })
     }
 }
 
@@ -138,7 +128,7 @@ impl<const N: usize> FollowedPath<N> {
         })
     }
 
-    /// The move of the setpoint to its place on the path at this pose of the arm.
+    /// The move of the setpoint to its point on the path at this pose of the arm.
     ///
     /// # Errors
     /// If the arm cannot follow.
@@ -164,7 +154,7 @@ impl<const N: usize> FollowedPath<N> {
             Standing::Moving | Standing::Arrived => {
                 self.task.path.held(time, PATH_PERIOD.as_secs_f64())
             }
-            Standing::OffPath(_) | Standing::Late(_) => at_rest(&pose.state),
+            Standing::OffPath(_) | Standing::Late(_) => Setpoint::at(pose.state.position),
         };
         let from = std::mem::replace(&mut self.setpoint, next);
         Ok(PathMove {
@@ -188,25 +178,7 @@ impl<const N: usize> FollowedPath<N> {
     pub fn halt(&self, pose: &Pose<N>) -> MoveSetpoint<N> {
         MoveSetpoint {
             from: self.setpoint,
-            to: at_rest(&pose.state),
+            to: Setpoint::at(pose.state.position),
         }
-    }
-}
-
-fn at_rest<const N: usize>(state: &State<N>) -> Setpoint<N> {
-    Setpoint::at(state.position)
-}
-
-impl<const N: usize, W: World<N>> LiveArm<N, W> {
-    /// Moves the setpoint, if it is still the sender's last one.
-    ///
-    /// # Errors
-    /// If not, the number of resets of the arm.
-    pub fn move_setpoint(&mut self, moved: MoveSetpoint<N>) -> Result<(), u64> {
-        if *self.simulation.pid().setpoint() != moved.from {
-            return Err(self.goals.past.resets);
-        }
-        self.change(ArmInput::Setpoint(moved.to));
-        Ok(())
     }
 }

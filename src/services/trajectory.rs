@@ -343,12 +343,12 @@ fn numbers<const N: usize>(raw: &RawValue, field: &str) -> Result<[f64; N], Reje
 fn order<const N: usize>(names: &Entries<'_>) -> Option<[usize; N]> {
     let spelled = names.first.iter().filter_map(|name| json::text(name));
     let spelled: Vec<_> = spelled.collect();
-    let place = |joint: &str| spelled.iter().position(|name| name == joint);
-    let places: Option<Vec<usize>> = joint_names::<N>().into_iter().map(place).collect();
-    places?.try_into().ok().filter(|_| names.count == N)
+    let index = |joint: &str| spelled.iter().position(|name| name == joint);
+    let indices: Option<Vec<usize>> = joint_names::<N>().into_iter().map(index).collect();
+    indices?.try_into().ok().filter(|_| names.count == N)
 }
 
 /// The values in the arm's order.
 fn by_joint<const N: usize>(order: [usize; N], values: &[f64; N]) -> [f64; N] {
-    order.map(|place| values.get(place).copied().unwrap_or_default())
+    order.map(|index| values.get(index).copied().unwrap_or_default())
 }

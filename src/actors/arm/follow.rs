@@ -8,7 +8,7 @@ use actix::prelude::*;
 
 use crate::actors::arm::sim::{ArmPose, MoveSetpoint, Pose};
 use crate::actors::node::{
-    ActionClient, Barrier, CancelSent, ForwardGoal, Goal, Nodes, ShutDown, Unserved, Working,
+    ActionClient, Barrier, CancelSent, ForwardGoal, Nodes, SentGoal, ShutDown, Unserved, Working,
 };
 use crate::live::{FollowedPath, PATH_PERIOD, PathEnd};
 use crate::protocol::catalog::Action;
@@ -50,11 +50,93 @@ impl<const N: usize> PathFollower<N> {
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve_action::<FollowPath<N>, _>(address.clone());
     }
+
+    /// Starts a goal in place of the previous one.
+    fn begin(
+        &mut self,
+        forwarded: ForwardGoal<FollowPath<N>>,
+        pose: &Pose<N>,
+        ctx: &mut Context<Self>,
+    ) {
+        let ForwardGoal {
+            goal,
+            client,
+            working,
+        } = forwarded;
+        let path = match FollowedPath::begin(goal, pose) {
+            Ok(path) => path,
+            Err(why) => return client.refuse(&why),
+        };
+        self.end(PathEnd::aborted("another goal has taken its place"));
+        self.active = Some(ActivePath { path, client });
+        self.move_setpoint(pose, Some(working), ctx);
+    }
+
+    /// Asks for the arm's pose, then moves its setpoint or ends the goal.
+    fn check_arm(&self) -> impl ActorFuture<Self, Output = ()> + use<N> {
+        let pose = self.arm.send(ArmPose).into_actor(self);
+        pose.map(|pose, node, ctx| match pose {
+            Ok(pose) => node.move_setpoint(&pose, None, ctx),
+            Err(_) => node.end(PathEnd::aborted(Unserved::NO_ARM.0)),
+        })
+    }
+
+    /// Moves the setpoint to its point on the path at this pose of the arm. Ends a goal that the arm cannot follow.
+    fn move_setpoint(&mut self, pose: &Pose<N>, working: Option<Working>, ctx: &mut Context<Self>) {
+        let Some(ActivePath { path, client }) = &mut self.active else {
+            return;
+        };
+        let next = match path.advance(pose, client.wants_feedback) {
+            Ok(next) => next,
+            Err(end) => return self.end(end),
+        };
+        if let Some(feedback) = next.feedback {
+            client.feed_back(feedback);
+        }
+        let moved = self.setpoint.send(next.setpoint).into_actor(self);
+        ctx.wait(moved.map(move |moved, node, ctx| {
+            match (moved, next.end, &node.active) {
+                (Ok(Ok(())), None, _) => node.set_timer(ctx),
+                (Ok(Ok(())), Some(end), _) => node.end(end),
+                (Ok(Err(resets)), _, Some(goal)) => node.end(goal.path.end_replaced(resets)),
+                _ => node.end(PathEnd::aborted(Unserved::NO_ARM.0)),
+            }
+            drop(working);
+        }));
+    }
+
+    /// Sets the timer for the next move of the setpoint.
+    fn set_timer(&mut self, ctx: &mut Context<Self>) {
+        if let Some(before) = self.timer.take() {
+            ctx.cancel_future(before);
+        }
+        self.timer = Some(ctx.run_later(PATH_PERIOD, |node, ctx| {
+            node.timer = None;
+            ctx.wait(node.check_arm());
+        }));
+    }
+
+    /// Ends the goal, if there is one.
+    fn end(&mut self, end: PathEnd) {
+        if let Some(goal) = self.active.take() {
+            goal.client.conclude(end.result, end.status);
+        }
+    }
+
+    /// Holds the arm at its present pose, unless another setpoint is active.
+    fn halt(&self, path: FollowedPath<N>) -> impl Future<Output = ()> + use<N> {
+        let (arm, setpoint) = (self.arm.clone(), self.setpoint.clone());
+        async move {
+            if let Ok(pose) = arm.send(ArmPose).await {
+                let _ = setpoint.send(path.halt(&pose)).await;
+            }
+        }
+    }
 }
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Goal for FollowPath<N> {
+impl<const N: usize> SentGoal for FollowPath<N> {
     const ACTION: Action = Action::FollowJointTrajectory;
 
     fn read(arguments: &Arguments) -> Result<Self, Rejections> {
@@ -117,91 +199,5 @@ impl<const N: usize> Handler<ShutDown> for PathFollower<N> {
 
     fn handle(&mut self, ShutDown(why): ShutDown, _: &mut Context<Self>) {
         self.end(PathEnd::aborted(why));
-    }
-}
-
-// ---- helpers --------------------------------------------------------------------------------------------------------
-
-impl<const N: usize> PathFollower<N> {
-    /// Starts a goal in place of the previous one.
-    fn begin(
-        &mut self,
-        forwarded: ForwardGoal<FollowPath<N>>,
-        pose: &Pose<N>,
-        ctx: &mut Context<Self>,
-    ) {
-        let ForwardGoal {
-            goal,
-            client,
-            working,
-        } = forwarded;
-        let path = match FollowedPath::begin(goal, pose) {
-            Ok(path) => path,
-            Err(why) => return client.refuse(&why),
-        };
-        self.end(PathEnd::aborted("another goal has taken its place"));
-        self.active = Some(ActivePath { path, client });
-        self.move_setpoint(pose, Some(working), ctx);
-    }
-
-    /// Asks for the arm's pose, then moves its setpoint or ends the goal.
-    fn check_arm(&self) -> impl ActorFuture<Self, Output = ()> + use<N> {
-        let pose = self.arm.send(ArmPose).into_actor(self);
-        pose.map(|pose, node, ctx| match pose {
-            Ok(pose) => node.move_setpoint(&pose, None, ctx),
-            Err(_) => node.end(PathEnd::aborted(Unserved::NO_ARM.0)),
-        })
-    }
-
-    /// Moves the setpoint to its place on the path at this pose of the arm. Ends a goal that the arm cannot follow.
-    fn move_setpoint(&mut self, pose: &Pose<N>, working: Option<Working>, ctx: &mut Context<Self>) {
-        let Some(ActivePath { path, client }) = &mut self.active else {
-            return;
-        };
-        let next = match path.advance(pose, client.wants_feedback) {
-            Ok(next) => next,
-            Err(end) => return self.end(end),
-        };
-        if let Some(feedback) = next.feedback {
-            client.feed_back(feedback);
-        }
-        let moved = self.setpoint.send(next.setpoint).into_actor(self);
-        ctx.wait(moved.map(move |moved, node, ctx| {
-            match (moved, next.end, &node.active) {
-                (Ok(Ok(())), None, _) => node.set_timer(ctx),
-                (Ok(Ok(())), Some(end), _) => node.end(end),
-                (Ok(Err(resets)), _, Some(goal)) => node.end(goal.path.end_replaced(resets)),
-                _ => node.end(PathEnd::aborted(Unserved::NO_ARM.0)),
-            }
-            drop(working);
-        }));
-    }
-
-    /// Sets the timer for the next move of the setpoint.
-    fn set_timer(&mut self, ctx: &mut Context<Self>) {
-        if let Some(before) = self.timer.take() {
-            ctx.cancel_future(before);
-        }
-        self.timer = Some(ctx.run_later(PATH_PERIOD, |node, ctx| {
-            node.timer = None;
-            ctx.wait(node.check_arm());
-        }));
-    }
-
-    /// Ends the goal, if there is one.
-    fn end(&mut self, end: PathEnd) {
-        if let Some(goal) = self.active.take() {
-            goal.client.conclude(end.result, end.status);
-        }
-    }
-
-    /// Holds the arm at its present pose, unless another setpoint is active.
-    fn halt(&self, path: FollowedPath<N>) -> impl Future<Output = ()> + use<N> {
-        let (arm, setpoint) = (self.arm.clone(), self.setpoint.clone());
-        async move {
-            if let Ok(pose) = arm.send(ArmPose).await {
-                let _ = setpoint.send(path.halt(&pose)).await;
-            }
-        }
     }
 }

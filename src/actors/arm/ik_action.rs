@@ -10,9 +10,9 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 
-use crate::actors::arm::sim::{ArmSim, CommandGoal, EndGoal, GoalProgress, Obstacle, TrackGoal};
+use crate::actors::arm::sim::{CommandGoal, EndGoal, GoalProgress, Obstacle, TrackGoal};
 use crate::actors::node::{
-    ActionClient, Ask, Barrier, Call, CancelSent, ForwardGoal, Goal, Nodes, Publish, ShutDown,
+    ActionClient, Ask, Barrier, Call, CancelSent, ForwardGoal, Nodes, Publish, SentGoal, ShutDown,
     Unserved,
 };
 pub use crate::live::GoalReport;
@@ -35,9 +35,10 @@ pub struct IkAction<const N: usize> {
 }
 
 /// The receiver of a goal's news besides the subscribers.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 enum GoalOwner<const N: usize> {
     /// Nobody: a client that called the service.
+    #[default]
     Subscribers,
     /// The trial.
     Node(Recipient<GoalReport<N>>),
@@ -57,18 +58,6 @@ pub struct GoalTracker<const N: usize> {
     pub command: Recipient<CommandGoal<N>>,
     /// Ends it.
     pub end: Recipient<EndGoal<N>>,
-}
-
-impl<const N: usize> GoalTracker<N> {
-    /// The recipients of this arm.
-    #[must_use]
-    pub fn of(arm: &Addr<ArmSim<N>>) -> Self {
-        Self {
-            track: arm.clone().recipient(),
-            command: arm.clone().recipient(),
-            end: arm.clone().recipient(),
-        }
-    }
 }
 
 impl<const N: usize> IkAction<N> {
@@ -180,7 +169,7 @@ impl<const N: usize> Message for GoalReport<N> {
     type Result = ();
 }
 
-impl<const N: usize> Goal for GoalRequest<N> {
+impl<const N: usize> SentGoal for GoalRequest<N> {
     const ACTION: Action = Action::MoveTo;
 
     fn read(arguments: &Arguments) -> Result<Self, Rejections> {

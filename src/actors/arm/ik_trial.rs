@@ -91,8 +91,8 @@ impl<const N: usize> IkTrial<N> {
     fn act(&mut self, pose: Option<Pose<N>>, intent: Intent, ctx: &mut Context<Self>) {
         let Some(pose) = pose else {
             // Without an arm there is nothing to do.
-            if let Intent::Perform(_, mut reply) = intent {
-                reply.refuse(Unserved::NO_ARM);
+            if let Intent::Perform(mut call) = intent {
+                call.reply.refuse(Unserved::NO_ARM);
             }
             return;
         };
@@ -104,21 +104,24 @@ impl<const N: usize> IkTrial<N> {
                 commands.push(TrialCommand::PublishStatus);
                 self.carry_out(commands, None, ctx);
             }
-            Intent::Perform(ask, mut reply) => match self.trial.decide(ask, &pose) {
-                Ok((more, obstacle)) => {
-                    // A new trial has another one.
-                    self.cancel_deadline(ctx);
-                    if let Some(obstacle) = obstacle {
-                        reply.warn(&obstacle.to_string());
+            Intent::Perform(call) => {
+                let Call { ask, mut reply } = *call;
+                match self.trial.decide(ask, &pose) {
+                    Ok((more, obstacle)) => {
+                        // A new trial has another one.
+                        self.cancel_deadline(ctx);
+                        if let Some(obstacle) = obstacle {
+                            reply.warn(&obstacle.to_string());
+                        }
+                        commands.extend(more);
+                        self.carry_out(commands, Some(reply), ctx);
                     }
-                    commands.extend(more);
-                    self.carry_out(commands, Some(reply), ctx);
+                    Err(why) => {
+                        self.carry_out(commands, None, ctx);
+                        reply.answer(self.trial.terms(Err(why)));
+                    }
                 }
-                Err(why) => {
-                    self.carry_out(commands, None, ctx);
-                    reply.answer(self.trial.terms(Err(why)));
-                }
-            },
+            }
         }
     }
 
@@ -167,14 +170,14 @@ impl<const N: usize> IkTrial<N> {
 
     /// Sets the timers of the present state, and no others. A running trial observes the arm, also without a goal.
     fn keep_timers(&mut self, ctx: &mut Context<Self>) {
-        let running = self.trial.running();
+        let running = self.trial.trial().running();
         if std::mem::replace(&mut self.observes, running) != running {
             self.arm.interest.do_send(Interest {
                 topic: Topic::TrialStatus,
                 wanted: running,
             });
         }
-        match self.trial.remaining() {
+        match self.trial.trial().remaining() {
             None => self.cancel_deadline(ctx),
             Some(remaining) if self.deadline.is_none() => {
                 let nap = Duration::try_from_secs_f64(remaining).unwrap_or(LONGEST_NAP);
@@ -186,7 +189,7 @@ impl<const N: usize> IkTrial<N> {
             }
             Some(_) => {}
         }
-        let is_watched = self.status_wanted && self.trial.status().is_some();
+        let is_watched = self.status_wanted && self.trial.trial().status().is_some();
         if is_watched && self.status_timer.is_none() {
             self.status_timer = Some(ctx.run_interval(STATUS_PERIOD, Self::status_due));
         } else if !is_watched && let Some(timer) = self.status_timer.take() {
@@ -202,7 +205,7 @@ impl<const N: usize> IkTrial<N> {
 
     /// A status has the present time. While a trial runs, the arm provides it.
     fn status_due(&mut self, ctx: &mut Context<Self>) {
-        if !self.trial.running() {
+        if !self.trial.trial().running() {
             self.publish_status();
         } else if !self.status_asked {
             self.status_asked = true;
@@ -214,7 +217,7 @@ impl<const N: usize> IkTrial<N> {
 /// The node's next action, once it has lengths and time.
 enum Intent {
     /// Performs a request.
-    Perform(TrialRequest, Reply<Terms>),
+    Perform(Box<Call<TrialRequest>>),
     /// The trial may be over.
     CheckDeadline,
     /// A status is due.
@@ -233,7 +236,7 @@ impl<const N: usize> Handler<Call<TrialRequest>> for IkTrial<N> {
     type Result = ();
 
     fn handle(&mut self, call: Call<TrialRequest>, ctx: &mut Context<Self>) {
-        self.ask_arm(Intent::Perform(call.ask, call.reply), ctx);
+        self.ask_arm(Intent::Perform(Box::new(call)), ctx);
     }
 }
 

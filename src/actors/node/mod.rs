@@ -16,10 +16,10 @@ mod questions;
 mod registry;
 mod routes;
 
-pub use self::callers::{Caller, ServiceCall, TopicMessage};
+pub use self::callers::{Caller, ServiceCall, TopicMessage, Unserved};
 pub use self::completion::{Completion, Working};
-pub use self::goals::{ActionClient, ActionRequest, CancelSent, ForwardGoal, Goal};
-pub use self::questions::{Asker, Call, Reply, Reserving, ShutDown, Unserved, ask};
+pub use self::goals::{ActionClient, ActionRequest, CancelSent, ForwardGoal, SentGoal};
+pub use self::questions::{Call, Reply, ShutDown, ask};
 pub use self::registry::{
     Barrier, ClientLink, FinishAll, FrameKind, Interest, Publish, RefuseCalls, Respond, SetTap,
     TakeCensus, Tap, Tapped,

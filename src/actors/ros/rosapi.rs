@@ -73,17 +73,17 @@ impl Handler<Call<AskRosapi>> for RosapiNode {
             if !reply.reserve(reserved).await {
                 return;
             }
-            // A call that waits for memory holds neither a place nor a census, so at most as many as there are places
+            // A call that waits for memory holds neither a thread nor a census, so at most as many as there are threads
             // exist. Names may be added during the wait.
-            while let Some(place) = WorkPermit::take(WorkKind::Listing).await {
+            while let Some(permit) = WorkPermit::take(WorkKind::Listing).await {
                 let census = registry.send(TakeCensus).await.unwrap_or_default();
                 let needed = census.most_bytes();
                 if needed <= reserved {
                     let list = move || reply.answer(answer(ask.question, &ask.name, &census));
-                    place.perform(list).await;
+                    permit.run(list).await;
                     return;
                 }
-                drop((place, census));
+                drop((permit, census));
                 reserved = needed + needed / 8;
                 if !reply.reserve(reserved).await {
                     return;

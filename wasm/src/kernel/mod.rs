@@ -32,8 +32,9 @@ use self::surroundings::Surroundings;
 pub const LINKS: [usize; 2] = [2, 3];
 
 /// The sender of a goal.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum GoalOwner {
+    #[default]
     Client,
     Trial,
 }

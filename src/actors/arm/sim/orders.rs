@@ -14,7 +14,7 @@ use super::node::ArmSim;
 use crate::actors::node::{Nodes, TopicMessage};
 use crate::live::{GoalProgress, Journal, MoveSetpoint, Pose, Tracking};
 use crate::math::kinematics::Unreachable;
-use crate::math::simulation::Simulation;
+use crate::math::simulation::{ArmInput, Simulation};
 use crate::protocol::catalog::Topic;
 use crate::services::arm::read_effort;
 use crate::services::trajectory::read_setpoint;
@@ -94,7 +94,11 @@ impl<const N: usize> ArmOrder<N> for SetSetpoint<N> {
 
 impl<const N: usize> ArmOrder<N> for MoveSetpoint<N> {
     fn perform(self, node: &mut ArmSim<N>) -> Result<(), u64> {
-        node.arm.move_setpoint(self)
+        if *node.arm.simulation.pid().setpoint() != self.from {
+            return Err(node.arm.pose().resets);
+        }
+        node.arm.change(ArmInput::Setpoint(self.to));
+        Ok(())
     }
 }
 

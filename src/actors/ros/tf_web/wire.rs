@@ -10,7 +10,7 @@ use bytes::Bytes;
 use serde_json::json;
 
 use super::{CancelPublished, FrameGoal, MAX_FRAMES, PublishedGoal, RepublishTfs, TfRepublisher};
-use crate::actors::node::{ActionClient, Address, Ask, ForwardGoal, Goal, Nodes, TopicMessage};
+use crate::actors::node::{ActionClient, Address, Ask, ForwardGoal, Nodes, SentGoal, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::scene::{WORLD, is_frame};
@@ -87,7 +87,7 @@ fn check_thresholds(fields: &mut Fields<'_>) {
 
 // ---- the action -----------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Goal for FrameGoal<N> {
+impl<const N: usize> SentGoal for FrameGoal<N> {
     const ACTION: Action = Action::TfSubscription;
 
     fn read(arguments: &Arguments) -> Result<Self, Rejections> {
