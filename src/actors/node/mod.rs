@@ -1,10 +1,9 @@
 //! The messages of the nodes: questions with one answer, messages on topics, interest, goals. And the way of a client's
 //! call or goal to its node and back.
 //!
-//! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. The asker,
-//! a client or another node, is behind the [`Reply`].
-//!
-//! The question also has its reader and the writer of its answer. The table of routes ([`Nodes`]) defines the node. All errors on the way are handled here: invalid arguments, a dropped
+//! A service is a question, [`Ask`], with its reader and the writer of its answer. A node serves it by a handler for
+//! [`Call`] of that question. The asker, a client or another node, is behind the [`Reply`]. The table of routes
+//! ([`Nodes`]) has the node of each service. All errors on the way are handled here: invalid arguments, a dropped
 //! question, and the form of an error.
 //!
 //! **Invariant:** every [`Call`] is answered exactly once. A node parses no JSON.
