@@ -1,28 +1,37 @@
 # Sourced by run.sh, load/run.sh, attack/run.sh, peers/run.sh, equal_error/run.sh and scripts/soak.sh: the folder of
 # results, the environment of a measurement, and the programs to compare with. Needs: `root` (this project). Sets:
-# `benches`, `target`, `built`, `core`. A kept run names the processor, never the machine or a path.
+# `benches`, `target`, `profile`, `built`, `core`, and the commands `pin` and `pin_others`,
+# which pin a program to that core and to those before it. A kept run names the processor, never the machine or a path.
 
 benches=$root/benches
 target=${CARGO_TARGET_DIR:-$root/target}
+profile=release
 built=$target/release
 
 # ARGS=--quick is for CI. Its figures have no meaning.
 quick=
 case " ${ARGS:-} " in *" --quick "*) quick=1 ;; esac
 
-# Builds our programs, given as --bin NAME: as releases, or for --quick as the tests are built, with the same features. Sets `built`.
+# Measures the shipped build, except for --quick.
+ship() { [ -n "$quick" ] || { profile=dist; built=$target/dist; }; }
+
+# Builds our programs, given as --bin NAME: in the profile, or for --quick as the tests are built, with the same features. Sets `built`.
 build() {
     if [ -n "$quick" ]; then
         built=$target/debug
         (cd "$root" && cargo build --locked --quiet -p pendularm --test house -p pendularm-benches "$@")
     else
-        (cd "$benches" && cargo build --release --locked --quiet "$@")
+        (cd "$benches" && cargo build --profile "$profile" --locked --quiet "$@")
     fi
 }
 
 # The last core, which has the fewest interrupts; without taskset, any core.
 core=${CORE:-$(($(getconf _NPROCESSORS_ONLN) - 1))}
-pinned() { if command -v taskset >/dev/null; then taskset -c "$core" "$@"; else "$@"; fi; }
+pin=() pin_others=()
+if command -v taskset >/dev/null; then
+    pin=(taskset -c "$core") pin_others=(taskset -c "0-$((core > 0 ? core - 1 : 0))")
+fi
+pinned() { "${pin[@]}" "$@"; }
 
 say() { echo "bench: $*"; }
 fail() { echo "bench: $*" >&2; exit 1; }
@@ -56,7 +65,7 @@ environment() {
     echo "commit:    $(git -C "$root" describe --always 2>/dev/null || echo unknown)${changed:+-dirty}"
     echo "processor: $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -n 1), $(getconf _NPROCESSORS_ONLN) cores"
     echo "system:    $(uname -s) $(uname -r | cut -d- -f1)"
-    echo "rustc:     $(cd "$root" && rustc --version), $(cd "$root" && rustc -vV | sed -n 's/^host: //p'), no flags beyond the release profile"
+    echo "rustc:     $(cd "$root" && rustc --version), $(cd "$root" && rustc -vV | sed -n 's/^host: //p'), no flags beyond the profile $profile"
     echo "load:      $(cut -d' ' -f1-3 /proc/loadavg 2>/dev/null || uptime) (1, 5, 15 minutes, at the start)"
 }
 

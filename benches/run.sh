@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# `make bench`: all figures of pendularm itself, one after another, on the release build. `make bench-peers` compares
+# `make bench`: all figures of pendularm itself, one after another, on the shipped build. `make bench-peers` compares
 # with others. It ends with a table of figures and bars. ARGS=--quick is a short run for CI. KEEP=1 keeps the output
 # with its environment in benches/results/<date>-<processor>/.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 source "$root/benches/common.sh"
+ship
 
 say "building pendularm and its benchmarks"
 seconds=()
@@ -13,7 +14,7 @@ if [ -n "$quick" ]; then
     build --bin idle
     seconds=(1)
 else
-    (cd "$root" && cargo build --release --locked --quiet)
+    (cd "$root" && cargo build --profile "$profile" --locked --quiet)
     build --features echo
 fi
 program=$built/pendularm

@@ -27,8 +27,8 @@ linux-*)
     python3 scripts/notices.py --sbom "dist/pendularm-$version.cdx.json"
     ;;
 *)
-    cargo build --release --locked
-    program=${CARGO_TARGET_DIR:-target}/release/pendularm
+    cargo build --profile dist --locked
+    program=${CARGO_TARGET_DIR:-target}/dist/pendularm
     [ -e "$program" ] || program=$program.exe
     ;;
 esac

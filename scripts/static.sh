@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds the release program for every Linux on this processor, with any C library. Zig, from PyPI in python/.venv,
+# Builds the shipped program for every Linux on this processor, with any C library. Zig, from PyPI in python/.venv,
 # links it against musl. The last line of standard output is the program's path.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -24,5 +24,5 @@ libraries=$(rustc --print sysroot)/lib/rustlib/$target
 export PATH=$tools/bin:$PATH
 # A given allocator library of the system belongs to another C library.
 unset JEMALLOC_OVERRIDE
-cargo-zigbuild zigbuild --release --locked --target "$target" --target-dir python/target/static >&2
-echo "$root/python/target/static/$target/release/pendularm"
+cargo-zigbuild zigbuild --profile dist --locked --target "$target" --target-dir python/target/static >&2
+echo "$root/python/target/static/$target/dist/pendularm"

@@ -2,13 +2,17 @@
 # `make bench-load`: messages between many clients, through pendularm, redis (pub/sub) and mosquitto, the same in one run.
 # At 60 Hz also through bare actors: what any program of actors needs for a delivery.
 #
+# The servers run on one core in turn, the client on the others. pendularm is the shipped build, or PROGRAM.
+#
 # All run on free ports of loopback. Each is stopped by its process id, pendularm by the client that starts it.
-# redis-server and mosquitto come from Debian's packages. As root they are installed if missing. Takes some minutes.
+# redis-server and mosquitto come from Debian's packages. As root they are installed if missing. Takes some
+# twenty minutes.
 # ARGS=--quick plays each scene for a moment, without bars; KEEP=1 keeps the figures in
 # benches/results/<date>-<processor>/load/.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/benches/common.sh"
+ship
 
 # Three servers with 250 clients each, and both ends of a connection need a file.
 needed_files=1024
@@ -25,10 +29,14 @@ cleanup() {
 trap cleanup EXIT
 
 install_peers
-say "building (release)"
-[ -n "${PROGRAM:-}" ] || (cd "$root" && cargo build --release --locked --quiet)
-(cd "$benches" && cargo build --release --locked --quiet --no-default-features --features bare --bin load --bin bare)
-program=${PROGRAM:-$built/pendularm}
+say "building (profile $profile)"
+[ -n "${PROGRAM:-}" ] || (cd "$root" && cargo build --profile "$profile" --locked --quiet)
+(cd "$benches" && cargo build --profile "$profile" --locked --quiet --no-default-features --features bare --bin load --bin bare)
+# With the servers' core, and the process id of the program itself.
+program=$scratch/pendularm
+echo "#!/bin/sh
+exec ${pin[*]} '${PROGRAM:-$built/pendularm}'"' "$@"' >"$program"
+chmod 755 "$program"
 
 # Waits until a server listens on port $1. $2 is its expected name.
 await() {
@@ -44,7 +52,7 @@ await() {
 { read -r redis_port; read -r mosquitto_port; read -r bare_port; } < <("$built/load" ports)
 
 # Every setting that would drop a message or write one to a disk is off.
-redis-server --bind 127.0.0.1 --port "$redis_port" --dir "$scratch" --save '' --appendonly no --maxclients 2000 \
+"${pin[@]}" redis-server --bind 127.0.0.1 --port "$redis_port" --dir "$scratch" --save '' --appendonly no --maxclients 2000 \
     --client-output-buffer-limit "pubsub 0 0 0" >"$scratch/redis.log" 2>&1 &
 redis=$!
 pids+=("$redis")
@@ -62,10 +70,10 @@ CONF
 # As root it switches to the user of that name, who must be able to read this for every umask.
 chmod 755 "$scratch"
 chmod 644 "$scratch/mosquitto.conf"
-mosquitto -c "$scratch/mosquitto.conf" >"$scratch/mosquitto.log" 2>&1 &
+"${pin[@]}" mosquitto -c "$scratch/mosquitto.conf" >"$scratch/mosquitto.log" 2>&1 &
 mosquitto=$!
 pids+=("$mosquitto")
-"$built/bare" "$bare_port" 2>"$scratch/bare.log" &
+"${pin[@]}" "$built/bare" "$bare_port" 2>"$scratch/bare.log" &
 bare=$!
 pids+=("$bare")
 await "$redis_port" redis
@@ -76,9 +84,10 @@ folder=$(results_folder)/load
 mkdir -p "$folder"
 {
     environment "make bench-load"
+    echo "pinned:    servers by ${pin[*]:-nothing}, client by ${pin_others[*]:-nothing}"
     echo "peers:     $(redis-server --version | sed 's/ sha=.*//'); $(mosquitto -h | sed -n 1p)"
 } | tee "$folder/environment.txt"
 # shellcheck disable=SC2086 # arguments, several
-"$built/load" "$program" "redis=127.0.0.1:$redis_port=$redis" \
+"${pin_others[@]}" "$built/load" "$program" "redis=127.0.0.1:$redis_port=$redis" \
     "mosquitto=127.0.0.1:$mosquitto_port=$mosquitto" "bare=127.0.0.1:$bare_port=$bare" ${ARGS:-} | tee "$folder/summary.txt"
 [ "${KEEP:-}" != 1 ] || say "kept in benches/results/$(basename "$(dirname "$folder")")/load"

@@ -151,11 +151,61 @@ pub fn simulation_time(client: &mut Client) -> f64 {
 /// # Panics
 /// If the process is gone.
 pub fn processor(pid: u32) -> u64 {
+    threads(pid).iter().map(|thread| thread.processor).sum()
+}
+
+/// The work of a thread so far.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ThreadWork {
+    /// The thread.
+    pub id: String,
+    /// Its name.
+    pub name: String,
+    /// Processor time \[ns\].
+    pub processor: u64,
+    /// Voluntary switches: each ends with a wake-up.
+    pub wake_ups: u64,
+    /// Involuntary switches, to another thread.
+    pub preemptions: u64,
+}
+
+/// The work of each thread of a process so far.
+///
+/// # Panics
+/// If the process is gone.
+pub fn threads(pid: u32) -> Vec<ThreadWork> {
     let threads = fs::read_dir(format!("/proc/{pid}/task")).expect("the server runs");
+    let read = |path: std::path::PathBuf| {
+        let status = fs::read_to_string(path.join("status")).ok()?;
+        let field = |name: &str| {
+            let mut lines = status.lines();
+            lines.find_map(|line| Some(line.strip_prefix(name)?.trim().to_owned()))
+        };
+        let schedstat = fs::read_to_string(path.join("schedstat")).ok()?;
+        Some(ThreadWork {
+            id: path.file_name()?.to_str()?.to_owned(),
+            name: field("Name:")?,
+            processor: schedstat.split_whitespace().next()?.parse().ok()?,
+            wake_ups: field("voluntary_ctxt_switches:")?.parse().ok()?,
+            preemptions: field("nonvoluntary_ctxt_switches:")?.parse().ok()?,
+        })
+    };
     threads
-        .filter_map(|thread| fs::read_to_string(thread.ok()?.path().join("schedstat")).ok())
-        .filter_map(|stat| stat.split_whitespace().next()?.parse::<u64>().ok())
-        .sum()
+        .filter_map(|thread| read(thread.ok()?.path()))
+        .collect()
+}
+
+/// The work of each thread since `before`, which a new thread is not in.
+pub fn threads_since(pid: u32, before: &[ThreadWork]) -> Vec<ThreadWork> {
+    let mut now = threads(pid);
+    for thread in &mut now {
+        if let Some(before) = before.iter().find(|one| one.id == thread.id) {
+            thread.processor -= before.processor;
+            thread.wake_ups -= before.wake_ups;
+            thread.preemptions -= before.preemptions;
+        }
+    }
+    now
 }
 
 /// Resident memory of a process \[MB\].

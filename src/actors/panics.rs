@@ -2,7 +2,7 @@
 //!
 //! No input is known to cause a panic. A panic while serving one client ends that client, and a panic in a computation
 //! ends that computation. Anywhere else, in a node or the registry, clients would wait without end. There the process
-//! ends at once, with one line that names the place, so a supervisor can restart it.
+//! ends at once, with one line that names the location, so a supervisor can restart it.
 //!
 //! **Invariant:** a caller of [`contain`] contains a panic, or the process ends.
 
@@ -20,7 +20,7 @@ thread_local! {
     static LAST: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// A contained panic. Its text has the place and the message.
+/// A contained panic. Its text has the location and the message.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Contained(String);
@@ -51,12 +51,12 @@ pub fn contain<T>(work: impl FnOnce() -> T) -> Result<T, Contained> {
     outcome.map_err(|_| Contained(LAST.with_borrow_mut(std::mem::take)))
 }
 
-/// One line: the place and the panic's message, escaped and shortened.
+/// One line: the location and the panic's message, escaped and shortened.
 fn describe(info: &PanicHookInfo<'_>) -> String {
     let mut line = String::from("panicked");
     // Writing to a `String` cannot fail.
-    if let Some(place) = info.location() {
-        let _ = write!(line, " at {place}");
+    if let Some(location) = info.location() {
+        let _ = write!(line, " at {location}");
     }
     let payload = info.payload();
     let text = payload.downcast_ref::<String>().map(String::as_str);

@@ -29,7 +29,7 @@ use crate::actors::recorder::{self, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::listening;
 use crate::actors::resources::long_work::THREADS;
-use crate::actors::resources::open_files::{Room, make_room};
+use crate::actors::resources::open_files::{Capacity, make_capacity};
 use crate::actors::resources::places::{MAX_NEWCOMERS, Slots};
 use crate::actors::resources::priority::lower_priority;
 use crate::actors::ros::rosout::Rosout;
@@ -122,14 +122,14 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
         .and_then(|socket| socket.local_addr().ok())
         .unwrap_or(options.bind);
 
-    let wanted = Room {
+    let wanted = Capacity {
         clients: options.clients,
         newcomers: MAX_NEWCOMERS,
     };
-    let room = make_room(wanted, options.token.is_some());
+    let capacity = make_capacity(wanted, options.token.is_some());
     let gauges = Arc::<Gauges>::default();
     let registry = Registry::new(Arc::clone(&gauges))
-        .serving_at_most(room.clients)
+        .serving_at_most(capacity.clients)
         .start();
     let workers = WorkerPool::start(WorkerPool::default_threads())?;
     // The arm has no sockets, so its thread sleeps on a lock instead of a poll, and wakes faster.
@@ -155,7 +155,7 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     #[cfg(feature = "record")]
     ends.record(options).await?;
 
-    let admission = Arc::new(admission(options, room.newcomers));
+    let admission = Arc::new(admission(options, capacity.newcomers));
     let listen = |socket| {
         let (admission, gauges) = (Arc::clone(&admission), Arc::clone(&gauges));
         actix_rt::spawn(accept(socket, admission, registry.clone(), gauges))

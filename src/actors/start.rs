@@ -74,7 +74,12 @@ pub fn start_nodes<const N: usize>(
         pose: arm.clone().recipient(),
         interest: arm.clone().recipient(),
     };
-    let (action, _) = start_goal_nodes(of_trial, GoalTracker::of(arm), registry, seed, nodes);
+    let tracker = GoalTracker {
+        track: arm.clone().recipient(),
+        command: arm.clone().recipient(),
+        end: arm.clone().recipient(),
+    };
+    let (action, _) = start_goal_nodes(of_trial, tracker, registry, seed, nodes);
     arm.do_send(AttachNodes {
         study: Some(study.recipient()),
         goal_reporters: vec![

@@ -145,7 +145,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         let simulation = &self.simulation;
         let (timestep, (limit, period_limit)) = (simulation.timestep(), self.limits());
         let method = simulation.method();
-        let place = if simulation.pid().is_enabled() {
+        let condition = if simulation.pid().is_enabled() {
             "at the present setpoint"
         } else {
             "with the controller off"
@@ -157,7 +157,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         };
         Some(match self.exceeded()? {
             Exceeded::Period => format!(
-                "the control period {}, the predicted stability limit of the controller {place}",
+                "the control period {}, the predicted stability limit of the controller {condition}",
                 over(effective, period_limit)
             ),
             Exceeded::Motion(motion) => format!(
@@ -166,7 +166,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
                 Shown(motion.speed)
             ),
             Exceeded::Timestep if limit == 0.0 => {
-                format!("no stable timestep is predicted for {method} {place}")
+                format!("no stable timestep is predicted for {method} {condition}")
             }
             Exceeded::Timestep => {
                 let is_default = simulation.control_period() == ControlPeriod::default();
@@ -176,7 +176,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
                     format!(" with a control period of {} s", Shown(effective))
                 };
                 format!(
-                    "the timestep {}, the predicted stability limit of {method} {place}{period}",
+                    "the timestep {}, the predicted stability limit of {method} {condition}{period}",
                     over(timestep, limit)
                 )
             }

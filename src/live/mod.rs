@@ -9,11 +9,14 @@
 
 mod counts;
 mod goals;
+mod ik_action;
+mod ik_trial;
 mod journal;
 mod limit;
 mod limit_watch;
 mod loads;
 mod parameters;
+mod path;
 mod requests;
 mod scene;
 mod steps;
@@ -37,8 +40,11 @@ use crate::services::study::Present;
 use crate::study::control_loop::ControlLoop;
 
 pub use self::goals::{GoalOrder, GoalProgress, Obstacle, Pose, Tracking};
+pub use self::ik_action::{GoalReport, IkGoals, cancelled};
+pub use self::ik_trial::{GoalAnswer, IkTrials};
 pub use self::journal::{ArmEvent, ArmListener, Journal, StepEvent};
 pub use self::limit::LEAST_PAUSE;
+pub use self::path::{FollowedPath, MoveSetpoint, PATH_PERIOD, PathEnd, PathMove};
 pub use self::requests::{ArmRequest, ControllerOn};
 pub use self::steps::StepsAsked;
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::arm::joint_names;
-use super::{Address, Answered, Ask, Callable};
+use super::{Address, Ask};
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::{Target, Unreachable};
 use crate::protocol::catalog::Service;
@@ -24,18 +24,14 @@ pub struct Solve<const N: usize>(pub Target);
 
 impl<const N: usize> Ask for Solve<N> {
     type Answer = Result<[f64; N], Unreachable>;
-}
 
-impl<const N: usize> Callable for Solve<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let target = read_target::<N>(&mut fields);
         let rejected = fields.finish();
         target.map(Self).ok_or(rejected)
     }
-}
 
-impl<const N: usize> Answered for Solve<N> {
     fn write(answer: Result<[f64; N], Unreachable>, to: &Address) -> Bytes {
         to.outcome(answer.map(|positions| json!({"positions": positions.to_vec()})))
     }
@@ -90,9 +86,7 @@ pub struct GoalRequest<const N: usize> {
 
 impl<const N: usize> Ask for GoalRequest<N> {
     type Answer = Result<String, Unreachable>;
-}
 
-impl<const N: usize> Callable for GoalRequest<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let target = read_target::<N>(&mut fields);
@@ -110,9 +104,7 @@ impl<const N: usize> Callable for GoalRequest<N> {
             }),
         }
     }
-}
 
-impl<const N: usize> Answered for GoalRequest<N> {
     fn write(answer: Result<String, Unreachable>, to: &Address) -> Bytes {
         to.outcome(answer.map(|goal_id| json!({"goal_id": goal_id})))
     }
@@ -127,17 +119,13 @@ pub struct CancelRequest {
 
 impl Ask for CancelRequest {
     type Answer = Result<(), CancelRejected>;
-}
 
-impl Callable for CancelRequest {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let goal_id = fields.text("goal_id").map(std::borrow::Cow::into_owned);
         fields.accept(Self { goal_id })
     }
-}
 
-impl Answered for CancelRequest {
     fn write(answer: Result<(), CancelRejected>, to: &Address) -> Bytes {
         to.outcome(answer.map(|()| Empty {}))
     }

@@ -20,34 +20,38 @@ macro_rules! object {
     }};
 }
 
-/// A request: its answer, and its fields with the expression that reads each. The fields of a `whole` request are all
-/// valid, or it is rejected. Of the others each field is checked alone, and the request has the rejections.
+/// A request: its answer, its fields with the expression that reads each, and the writer of the answer. The fields of a
+/// `whole` request are all valid, or it is rejected. Of the others each field is checked alone: an invalid one never
+/// prevents a valid one from taking effect, and the request has the rejections.
 macro_rules! request {
     (whole $(#[$about:meta])* pub struct $request:ident<$n:ident> -> $answer:ty, |$fields:ident| {
         $($(#[$doc:meta])* $field:ident: $kind:ty = $read:expr,)*
-    }) => {
+    } $($write:tt)*) => {
         $(#[$about])*
         pub struct $request<const $n: usize> {
             $($(#[$doc])* pub $field: $kind,)*
         }
 
-        impl<const $n: usize> Ask for $request<$n> {
+        impl<const $n: usize> $crate::services::Ask for $request<$n> {
             type Answer = $answer;
-        }
 
-        impl<const $n: usize> Callable for $request<$n> {
-            fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+            fn read(
+                service: $crate::protocol::catalog::Service,
+                arguments: &$crate::protocol::op::Arguments,
+            ) -> Result<Self, Rejections> {
                 let mut $fields = Fields::read(arguments, service)?;
                 let request = Self {
                     $($field: $read,)*
                 };
                 $fields.accept(request)
             }
+
+            $($write)*
         }
     };
     ($(#[$about:meta])* pub struct $request:ident$(<$n:ident>)? -> $answer:ty, |$fields:ident| {
         $($(#[$doc:meta])* $field:ident: $kind:ty = $read:expr,)*
-    }) => {
+    } $($write:tt)*) => {
         $(#[$about])*
         #[derive(Debug, Clone, PartialEq, Default)]
         pub struct $request$(<const $n: usize>)? {
@@ -56,17 +60,27 @@ macro_rules! request {
             pub rejected: Rejections,
         }
 
-        impl$(<const $n: usize>)? Ask for $request$(<$n>)? {
-            type Answer = $answer;
-        }
-
-        impl$(<const $n: usize>)? FieldByField for $request$(<$n>)? {
-            fn from_fields($fields: &mut Fields<'_>) -> Self {
+        impl$(<const $n: usize>)? $request$(<$n>)? {
+            /// The request with the valid fields and the rejections.
+            pub fn from_fields($fields: &mut Fields<'_>) -> Self {
                 Self {
                     $($field: $read,)*
                     rejected: $fields.rejections(),
                 }
             }
+        }
+
+        impl$(<const $n: usize>)? $crate::services::Ask for $request$(<$n>)? {
+            type Answer = $answer;
+
+            fn read(
+                service: $crate::protocol::catalog::Service,
+                arguments: &$crate::protocol::op::Arguments,
+            ) -> Result<Self, Rejections> {
+                Ok(Self::from_fields(&mut Fields::read_or_none(arguments, service)))
+            }
+
+            $($write)*
         }
     };
 }
@@ -83,7 +97,7 @@ use serde::Serialize;
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, ErrorForm};
 use crate::protocol::op::Arguments;
-use crate::protocol::op::fields::{Fields, Rejections};
+use crate::protocol::op::fields::Rejections;
 use crate::protocol::wire::json::Payload;
 
 /// Why no node or client serves a call.
@@ -97,41 +111,19 @@ pub enum NoService {
     NotServed(String),
 }
 
-/// A question that a node answers.
-pub trait Ask: Send + 'static {
+/// A request of a service: the question that a node answers. Clients send it as a service call.
+pub trait Ask: Sized + Send + 'static {
     /// The answer. It is a `Result` if the request may be refused.
     type Answer: Send + 'static;
-}
 
-/// A question that clients can send as a service call.
-pub trait Callable: Ask + Sized {
     /// Reads it.
     ///
     /// # Errors
     /// If it is rejected before it reaches the node: all rejected fields, by name.
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections>;
-}
 
-/// A question whose answer is written as a response.
-pub trait Answered: Callable {
     /// Writes the response.
     fn write(answer: Self::Answer, to: &Address) -> Bytes;
-}
-
-// ---- requests whose fields are checked one by one -------------------------------------------------------------------
-
-/// A request with its valid fields and its rejections. An invalid field never prevents a valid one from taking effect.
-pub trait FieldByField: Ask + Sized {
-    /// The request with the valid fields and the rejections.
-    fn from_fields(fields: &mut Fields<'_>) -> Self;
-}
-
-impl<A: FieldByField> Callable for A {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        Ok(Self::from_fields(&mut Fields::read_or_none(
-            arguments, service,
-        )))
-    }
 }
 
 /// The answer to a request whose fields are checked one by one.

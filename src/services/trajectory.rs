@@ -1,15 +1,19 @@
 //! Trajectories: the setpoint of a message on `/joint_trajectory`, and the goal of
-//! `control_msgs/action/FollowJointTrajectory` with its tolerances.
+//! `control_msgs/action/FollowJointTrajectory` with its tolerances, its feedback and its result.
 //!
 //! **Invariant:** every setpoint and point has a finite position of each joint, in the arm's order. Every error names
 //! its field.
 
+use serde::Serialize;
 use serde_json::value::RawValue;
+use serde_json::{Value, json};
 
 use super::arm::joint_names;
+use crate::math::arm::State;
 use crate::math::pid::Setpoint;
 use crate::math::trajectory::{Tolerance, Waypoint};
 use crate::protocol::catalog::Action;
+use crate::protocol::messages::{Header, Stamp};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{
     self, Bound, Fields, MISSING, RejectedField, Rejections, finite, too_many, wrong_length,
@@ -129,6 +133,64 @@ impl<const N: usize> FollowPath<N> {
             },
         })
     }
+}
+
+/// Feedback or result of the action, in JSON.
+#[derive(Debug, Serialize)]
+pub struct PathMessage(Value);
+
+/// The result codes of the action.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ResultCode {
+    /// Arrived, or cancelled.
+    Successful = 0,
+    /// Refused or replaced.
+    InvalidGoal = -1,
+    /// Off the path.
+    PathToleranceViolated = -4,
+    /// Not at the end in time.
+    GoalToleranceViolated = -5,
+}
+
+/// `control_msgs/action/FollowJointTrajectory_Result`.
+#[must_use]
+pub fn path_result(code: ResultCode, why: &str) -> PathMessage {
+    PathMessage(json!({"error_code": code as i32, "error_string": why}))
+}
+
+/// `control_msgs/action/FollowJointTrajectory_Feedback` at simulation time `now`, `time` after the start \[s\].
+#[must_use]
+pub fn path_feedback<const N: usize>(
+    now: f64,
+    time: f64,
+    desired: &Setpoint<N>,
+    actual: &State<N>,
+) -> PathMessage {
+    let time_from_start = Stamp::from_seconds(time);
+    let point = |positions: [f64; N], velocities: [f64; N]| {
+        json!({
+            "positions": positions.as_slice(),
+            "velocities": velocities.as_slice(),
+            "accelerations": [],
+            "effort": [],
+            "time_from_start": time_from_start,
+        })
+    };
+    let off = |wanted: [f64; N], is: [f64; N]| {
+        let mut off = wanted;
+        off.iter_mut().zip(is).for_each(|(off, is)| *off -= is);
+        off
+    };
+    PathMessage(json!({
+        "header": Header::world(now),
+        "joint_names": joint_names::<N>().as_slice(),
+        "desired": point(desired.position, desired.velocity),
+        "actual": point(actual.position, actual.velocity),
+        "error": point(
+            off(desired.position, actual.position),
+            off(desired.velocity, actual.velocity),
+        ),
+    }))
 }
 
 fn points<const N: usize>(trajectory: &RawValue) -> Result<Vec<Waypoint<N>>, RejectedField> {
@@ -281,12 +343,12 @@ fn numbers<const N: usize>(raw: &RawValue, field: &str) -> Result<[f64; N], Reje
 fn order<const N: usize>(names: &Entries<'_>) -> Option<[usize; N]> {
     let spelled = names.first.iter().filter_map(|name| json::text(name));
     let spelled: Vec<_> = spelled.collect();
-    let place = |joint: &str| spelled.iter().position(|name| name == joint);
-    let places: Option<Vec<usize>> = joint_names::<N>().into_iter().map(place).collect();
-    places?.try_into().ok().filter(|_| names.count == N)
+    let index = |joint: &str| spelled.iter().position(|name| name == joint);
+    let indices: Option<Vec<usize>> = joint_names::<N>().into_iter().map(index).collect();
+    indices?.try_into().ok().filter(|_| names.count == N)
 }
 
 /// The values in the arm's order.
 fn by_joint<const N: usize>(order: [usize; N], values: &[f64; N]) -> [f64; N] {
-    order.map(|place| values.get(place).copied().unwrap_or_default())
+    order.map(|index| values.get(index).copied().unwrap_or_default())
 }

@@ -8,7 +8,7 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use super::goals::TargetMessage;
-use super::{Address, Answered, Ask, Callable};
+use super::{Address, Ask};
 use crate::math::trial::{Changes, Rejection, Settings, Status};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::Empty;
@@ -34,10 +34,6 @@ pub enum TrialRequest {
     Stop,
 }
 
-impl Ask for TrialRequest {
-    type Answer = Terms;
-}
-
 /// The settings of trials, and the outcome of a request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Terms {
@@ -58,7 +54,9 @@ pub enum TrialRefused {
     Refused(#[from] Rejection),
 }
 
-impl Callable for TrialRequest {
+impl Ask for TrialRequest {
+    type Answer = Terms;
+
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         if service != Service::TrialStart {
             Fields::read(arguments, service)?;
@@ -79,9 +77,7 @@ impl Callable for TrialRequest {
             }
         })
     }
-}
 
-impl Answered for TrialRequest {
     fn write(Terms { settings, outcome }: Terms, to: &Address) -> Bytes {
         if to.service() != Service::TrialStart {
             return to.outcome(outcome.map(|()| Empty {}));

@@ -1,6 +1,6 @@
 //! The last report: files of one folder, with simple names.
 //!
-//! **Invariant:** a served file is in the folder, and links to other places are not followed. Its type is in the
+//! **Invariant:** a served file is in the folder, and links that lead out of it are not followed. Its type is in the
 //! table. At most [`FILES`] files are in memory, each of at most [`MAX_FILE`] bytes.
 
 use std::fs;

@@ -49,7 +49,8 @@ pub async fn serve<S, G>(
     stream: S,
     first: BytesMut,
     due: Instant,
-    (site, local): (&Site, SocketAddr),
+    site: &Site,
+    local: SocketAddr,
     gate: &G,
     cut_off: impl Future<Output = String>,
 ) -> Option<(S, Bytes)>

@@ -90,14 +90,14 @@ impl<S: AsyncRead + Unpin> hyper::rt::Read for HttpStream<S> {
     ) -> Poll<io::Result<()>> {
         let this = self.get_mut();
         this.deadline.end_answer();
-        let room = cursor.remaining();
+        let left = cursor.remaining();
         if !this.first.is_empty() {
-            let length = this.first.len().min(room);
+            let length = this.first.len().min(left);
             cursor.put_slice(&this.first.split_to(length));
             return Poll::Ready(Ok(()));
         }
         let mut bytes = [0; CHUNK];
-        let bytes = bytes.get_mut(..room.min(CHUNK)).unwrap_or_default();
+        let bytes = bytes.get_mut(..left.min(CHUNK)).unwrap_or_default();
         let mut buffer = ReadBuf::new(bytes);
         ready!(Pin::new(&mut this.stream).poll_read(cx, &mut buffer))?;
         cursor.put_slice(buffer.filled());

@@ -5,9 +5,10 @@
 //! yields.
 
 use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
 use std::rc::Rc;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
 use std::task::Poll;
 use std::time::Duration;
 
@@ -20,7 +21,7 @@ use pendularm::actors::arm::sim::{
     Pause, Reset, STEPS_IN_A_ROW, SetParams, Step, TURN_MESSAGES, TakeSnapshot, TrackGoal,
 };
 use pendularm::actors::node::{
-    Ask, Asker, Barrier, Call, Interest, Publish, Reply, ShutDown, Unserved, Working,
+    Ask, Barrier, Call, Interest, Publish, Reply, ShutDown, Unserved, ask,
 };
 use pendularm::math::arm::Arm;
 use pendularm::math::goal::Criteria;
@@ -28,6 +29,7 @@ use pendularm::math::kinematics::Target;
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::op::fields::Rejections;
+use tokio::sync::oneshot;
 use tokio::time::advance;
 
 /// Turns of other tasks in one publishing tick. The clock moves by a millisecond in each.
@@ -37,30 +39,17 @@ const MANY_TURNS: usize = 1_000_000;
 /// Messages of one kind.
 const FLOOD: usize = 100 * TURN_MESSAGES;
 
-/// The answers so far: for each, why it is none.
-type Answers = Arc<Mutex<Vec<Option<Unserved>>>>;
-
-/// Replaces a client.
-struct Client {
-    answers: Answers,
-    is_gone: bool,
-}
-
-impl<T> Asker<T> for Client {
-    fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Working>) {
-        self.answers.lock().unwrap().push(answer.err());
-    }
-
-    fn is_gone(&self) -> bool {
-        self.is_gone
-    }
-}
+/// Takes an answer that has arrived: why it is none.
+type TakeAnswer = Box<dyn FnMut() -> Option<Option<Unserved>>>;
 
 /// An arm of three links with a subscriber of `/joint_states`.
 struct TurnsBench {
     arm: Addr<ArmSim<3>>,
     ticks: Arc<AtomicUsize>,
-    answers: Answers,
+    /// The answers that have not been taken, in the order of the questions.
+    waiting: RefCell<VecDeque<TakeAnswer>>,
+    /// Those that have been: for each, why it is none.
+    answers: RefCell<Vec<Option<Unserved>>>,
 }
 
 impl TurnsBench {
@@ -75,11 +64,11 @@ impl TurnsBench {
         let topic = Topic::JointStates;
         let wanted = true;
         arm.send(Interest { topic, wanted }).await.unwrap();
-        let answers = Answers::default();
         Self {
             arm,
             ticks,
-            answers,
+            waiting: RefCell::default(),
+            answers: RefCell::default(),
         }
     }
 
@@ -89,30 +78,39 @@ impl TurnsBench {
         bench.ask(pause(true));
         bench.ask(Reset::default());
         bench.until_answers(2).await;
-        bench.answers.lock().unwrap().clear();
+        bench.answers.borrow_mut().clear();
         bench
     }
 
-    fn ask<A: Ask>(&self, ask: A)
+    fn ask<A: Ask>(&self, question: A)
     where
         ArmSim<3>: Handler<Call<A>>,
     {
-        self.ask_as(false, ask);
+        let (answered, mut answer) = oneshot::channel();
+        let reply = Reply::to_node(answered, None);
+        self.arm.do_send(Call {
+            ask: question,
+            reply,
+        });
+        let refused = move || answer.try_recv().ok().map(Result::err);
+        self.waiting.borrow_mut().push_back(Box::new(refused));
     }
 
-    fn ask_as<A: Ask>(&self, is_gone: bool, ask: A)
-    where
-        ArmSim<3>: Handler<Call<A>>,
-    {
-        let answers = Arc::clone(&self.answers);
-        let reply = Reply::new(Client { answers, is_gone }, None);
-        self.arm.do_send(Call { ask, reply });
+    /// Takes the answers that have arrived. Returns their number so far.
+    fn take_answers(&self) -> usize {
+        let mut waiting = self.waiting.borrow_mut();
+        let mut answers = self.answers.borrow_mut();
+        while let Some(refused) = waiting.front_mut().and_then(|take| take()) {
+            answers.push(refused);
+            waiting.pop_front();
+        }
+        answers.len()
     }
 
     /// Gives the arm turns of a millisecond each until this number of answers has arrived. Returns the number of turns.
     async fn until_answers(&self, count: usize) -> usize {
         for turns in 0..MANY_TURNS {
-            if self.answers.lock().unwrap().len() >= count {
+            if self.take_answers() >= count {
                 return turns;
             }
             advance(Duration::from_millis(1)).await;
@@ -175,20 +173,20 @@ fn the_tick_comes_however_many_messages_wait_for_the_arm() {
 fn steps_of_a_client_that_is_gone_are_not_taken_and_at_the_end_the_rest_is_refused() {
     in_virtual_time(async {
         let bench = TurnsBench::paused().await;
-        bench.ask_as(true, step(MAX_STEPS));
+        drop(ask(&bench.arm.clone().recipient(), step(MAX_STEPS)));
         bench.ask(step(2 * STEPS_IN_A_ROW));
-        bench.until_answers(2).await;
+        bench.until_answers(1).await;
         assert_eq!(bench.steps_taken().await, 2 * STEPS_IN_A_ROW);
         for _ in 0..3 {
             bench.ask(step(MAX_STEPS));
         }
         bench.arm.do_send(ShutDown("shutting down"));
-        bench.until_answers(5).await;
+        bench.until_answers(4).await;
         assert_eq!(bench.steps_taken().await, 5 * STEPS_IN_A_ROW);
-        let answers = bench.answers.lock().unwrap();
+        let answers = bench.answers.borrow();
         let refused = Some(Unserved("shutting down"));
         assert!(
-            answers[2..].iter().all(|one| *one == refused),
+            answers[1..].iter().all(|one| *one == refused),
             "{answers:?}"
         );
     });

@@ -13,7 +13,7 @@ use pendularm::actors::gateway::limits::{
     CLIENT_BYTES, MAX_LONG_FORMS, MAX_MEMORY, RESPONSES_TIME,
 };
 use pendularm::actors::gateway::registry::{Attach, Nodes};
-use pendularm::actors::resources::long_work::{PLACES, WorkKind, WorkPermit};
+use pendularm::actors::resources::long_work::{THREADS_OF_A_KIND, WorkKind, WorkPermit};
 use pendularm::actors::resources::memory::{
     LONG_ANSWERS, LONG_FRAMES, LONGEST_ANSWER, Memory, SHORT,
 };
@@ -120,14 +120,16 @@ fn a_long_list_that_waits_for_memory_occupies_no_thread_and_short_ones_pass() {
                 .await;
         }
         sleep(Duration::from_millis(100)).await;
-        let mut clients: Vec<Client> = (0..PLACES + 2).map(|_| gateway.connect(WIDE)).collect();
+        let mut clients: Vec<Client> = (0..THREADS_OF_A_KIND + 2)
+            .map(|_| gateway.connect(WIDE))
+            .collect();
         for client in &mut clients {
             ask(client, "/rosapi/topics", json!({})).await;
         }
         settle().await;
-        let place = timeout(Duration::from_secs(1), WorkPermit::take(WorkKind::Listing)).await;
-        assert!(place.is_ok(), "the waiting lists have all places");
-        drop(place);
+        let permit = timeout(Duration::from_secs(1), WorkPermit::take(WorkKind::Listing)).await;
+        assert!(permit.is_ok(), "the waiting lists have all threads");
+        drop(permit);
         drop(all);
         for client in &mut clients {
             let answer = client.receive().await;

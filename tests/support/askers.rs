@@ -1,46 +1,24 @@
 //! Clients that call a node by typed messages, without registry and connections. So their turns on the pool can be
 //! distinguished.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use actix::dev::ToEnvelope;
 use actix::prelude::*;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::node::{Ask, Asker, Call, Completion, Reply, Unserved, Working};
+use pendularm::actors::node::{Ask, Call, Completion, Reply, Unserved};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::sync::oneshot;
+use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
 /// Longest wait before a test fails.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Replaces a client with a call: reports its answer, and passes it on.
-struct Asking<T> {
-    connection: u64,
-    gone: Arc<AtomicBool>,
-    answered: UnboundedSender<u64>,
-    answer: oneshot::Sender<Result<T, Unserved>>,
-}
-
-impl<T: Send> Asker<T> for Asking<T> {
-    fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Working>) {
-        // The answer is stored before it is reported.
-        let _ = self.answer.send(answer);
-        let _ = self.answered.send(self.connection);
-    }
-
-    fn is_gone(&self) -> bool {
-        self.gone.load(Ordering::Relaxed)
-    }
-}
-
-/// A pending call: its answer, its end, and a flag that its caller has disconnected.
+/// A pending call: its answer, and its end. Its caller disconnects when the answer's task is aborted.
 pub struct Asked<T> {
-    pub answer: oneshot::Receiver<Result<T, Unserved>>,
+    pub answer: JoinHandle<Result<T, Unserved>>,
     pub completion: Completion,
-    pub gone: Arc<AtomicBool>,
 }
 
 /// Calls as the client of that connection, and reports when the answer has arrived.
@@ -50,22 +28,17 @@ pub fn ask_as<A: Ask>(
     answered: &UnboundedSender<u64>,
     ask: A,
 ) -> Asked<A::Answer> {
-    let gone = Arc::new(AtomicBool::new(false));
     let (working, completion) = Completion::pending();
     let (give, answer) = oneshot::channel();
-    let asking = Asking {
-        connection,
-        gone: Arc::clone(&gone),
-        answered: answered.clone(),
-        answer: give,
-    };
-    let reply = Reply::new(asking, Some(working));
+    let reply = Reply::to_node(give, Some(working));
     node.do_send(Call { ask, reply });
-    Asked {
-        answer,
-        completion,
-        gone,
-    }
+    let answered = answered.clone();
+    let answer = actix_rt::spawn(async move {
+        let answer = answer.await.unwrap_or(Err(Unserved::ENDED));
+        let _ = answered.send(connection);
+        answer
+    });
+    Asked { answer, completion }
 }
 
 /// A node that computes on a pool, and clients that call it.

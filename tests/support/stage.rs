@@ -110,7 +110,7 @@ where
 {
     let (answered, answer) = oneshot::channel();
     let (working, completion) = Completion::pending();
-    let reply = Reply::new(answered, Some(working));
+    let reply = Reply::to_node(answered, Some(working));
     node.send(Call { ask, reply }).await.unwrap();
     let answer = answer.await.expect("an asker").expect("an answer");
     completion.wait().await;

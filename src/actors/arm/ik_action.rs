@@ -1,24 +1,22 @@
 //! Goals: `/ik_action/send_goal` and `/ik_action/cancel_goal`, feedback on `/ik_action/feedback`, the end on
-//! `/ik_action/result`.
+//! `/ik_action/result`. The rules are in `live::ik_action`.
 //!
 //! The arm solves a goal, and checks it at every step once it has the setpoint. Subscribers get that setpoint on
-//! `/joint_trajectory`. While a goal starts, the node handles no other message, so goals do not interleave.
+//! `/joint_trajectory`.
 //!
-//! **Invariant:** at most one goal is active, and each has exactly one result. A preempting goal comes in this order:
-//! the old goal's result, the response, the trajectory, feedback, result.
+//! **Invariant:** while a goal starts or ends, the node handles no other message, so goals do not interleave.
 
 use std::sync::Arc;
 
 use actix::prelude::*;
-use serde::Serialize;
 
-use crate::actors::arm::sim::{
-    ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal, Tracking,
-};
+use crate::actors::arm::sim::{CommandGoal, EndGoal, GoalProgress, Obstacle, TrackGoal};
 use crate::actors::node::{
-    ActionClient, Ask, Asker, Barrier, Call, Callable, CancelSent, ForwardGoal, Goal, Nodes,
-    Publish, Reply, ShutDown, Unserved, Working,
+    ActionClient, Ask, Barrier, Call, CancelSent, ForwardGoal, Nodes, Publish, SentGoal, ShutDown,
+    Unserved,
 };
+pub use crate::live::GoalReport;
+use crate::live::{IkGoals, cancelled};
 use crate::math::goal::Outcome;
 use crate::math::kinematics::Unreachable;
 use crate::protocol::catalog::{Action, Service, Topic};
@@ -33,27 +31,23 @@ pub use crate::services::goals::{CancelRejected, CancelRequest, GoalRequest};
 pub struct IkAction<const N: usize> {
     arm: GoalTracker<N>,
     publish: Recipient<Publish>,
-    active: Option<ActiveGoal<N>>,
-    /// Goals accepted so far: their numbers make the ids.
-    accepted: u64,
-}
-
-/// The active goal.
-struct ActiveGoal<const N: usize> {
-    goal: AcceptedGoal<N>,
-    /// The receiver of the goal's news besides the subscribers.
-    owner: Option<GoalOwner<N>>,
-    /// The status for its client if it ends before it is reached.
-    if_preempted: GoalStatus,
+    goals: IkGoals<N, GoalOwner<N>>,
 }
 
 /// The receiver of a goal's news besides the subscribers.
+#[derive(Clone, Default)]
 enum GoalOwner<const N: usize> {
+    /// Nobody: a client that called the service.
+    #[default]
+    Subscribers,
     /// The trial.
     Node(Recipient<GoalReport<N>>),
     /// A client that sent it by the action.
     Client(Arc<ActionClient>),
 }
+
+/// A goal that the arm tracks, and the reason why it does not move yet.
+type Begun<const N: usize> = Result<(AcceptedGoal<N>, Option<Obstacle>), Unreachable>;
 
 /// The messages to the arm for goals.
 #[derive(Clone)]
@@ -66,18 +60,6 @@ pub struct GoalTracker<const N: usize> {
     pub end: Recipient<EndGoal<N>>,
 }
 
-impl<const N: usize> GoalTracker<N> {
-    /// The recipients of this arm.
-    #[must_use]
-    pub fn of(arm: &Addr<ArmSim<N>>) -> Self {
-        Self {
-            track: arm.clone().recipient(),
-            command: arm.clone().recipient(),
-            end: arm.clone().recipient(),
-        }
-    }
-}
-
 impl<const N: usize> IkAction<N> {
     /// A node without a goal.
     #[must_use]
@@ -85,8 +67,7 @@ impl<const N: usize> IkAction<N> {
         Self {
             arm,
             publish,
-            active: None,
-            accepted: 0,
+            goals: IkGoals::default(),
         }
     }
 
@@ -96,11 +77,86 @@ impl<const N: usize> IkAction<N> {
         nodes.serve::<CancelRequest>(Service::CancelGoal, address.clone());
         nodes.serve_action::<GoalRequest<N>, _>(address.clone());
     }
+
+    /// The arm begins the goal, in place of the previous one. Answer its sender, then call [`Self::set_in_motion`].
+    fn begin(
+        &self,
+        goal: GoalRequest<N>,
+        owner: GoalOwner<N>,
+        ctx: &Context<Self>,
+    ) -> impl ActorFuture<Self, Output = Result<Begun<N>, Unserved>> + use<N> {
+        let order = self.goals.order(goal);
+        let tracking = self.arm.track.send(TrackGoal {
+            goal: order,
+            owner: ctx.address().recipient(),
+        });
+        tracking.into_actor(self).map(move |tracking, node, _| {
+            let tracking = tracking.map_err(|_| Unserved::NO_ARM)?;
+            Ok(tracking.map(|tracking| {
+                let (before, goal) = node.goals.accept(&order, owner, &tracking);
+                node.pass_on(before, GoalStatus::Aborted);
+                (goal, tracking.obstacle)
+            }))
+        })
+    }
+
+    /// Sends the goal's setpoint to the subscribers, and then to the arm.
+    fn set_in_motion(&self, goal: AcceptedGoal<N>) {
+        let (number, positions) = (goal.number, goal.positions);
+        let trajectory = Publish::made(Topic::JointTrajectory, move || goal.trajectory());
+        self.publish.do_send(trajectory);
+        self.arm.command.do_send(CommandGoal { number, positions });
+    }
+
+    /// Preempts the active goal, unless the arm has reached it already. Its client gets that `status`.
+    fn end(
+        &self,
+        number: u64,
+        status: GoalStatus,
+    ) -> impl ActorFuture<Self, Output = Result<(), CancelRejected>> + use<N> {
+        let ended = self.arm.end.send(EndGoal { number }).into_actor(self);
+        ended.map(move |ended, node, _| {
+            // An arm that has ended has no goal.
+            let latest = ended.ok().flatten();
+            let report = latest.and_then(|latest| node.goals.report(latest));
+            node.pass_on(report, status);
+            cancelled(latest)
+        })
+    }
+
+    /// Publishes feedback or a result, and informs the owner. The client of a preempted goal gets the status
+    /// `if_preempted`.
+    fn pass_on(&self, report: Option<(GoalReport<N>, GoalOwner<N>)>, if_preempted: GoalStatus) {
+        let Some((report, owner)) = report else {
+            return;
+        };
+        let (topic, frame) = report.message();
+        let frame = Box::new(frame);
+        self.publish.do_send(Publish { topic, frame });
+        match owner {
+            GoalOwner::Subscribers => {}
+            GoalOwner::Node(owner) => owner.do_send(report),
+            GoalOwner::Client(client) => {
+                let GoalReport { goal, progress } = report;
+                let status = match progress.outcome {
+                    None => {
+                        let feedback = goal.feedback(progress.distance, progress.elapsed);
+                        return client.feed_back(feedback);
+                    }
+                    Some(Outcome::Reached) => GoalStatus::Succeeded,
+                    Some(Outcome::Preempted) => if_preempted,
+                };
+                client.conclude(goal.result(progress.distance, progress.outcome), status);
+            }
+        }
+    }
 }
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// A goal of the trial. The answer is its id, sent before its trajectory is published.
+/// A goal of the trial. The answer is its id; `None` if it is refused.
+#[derive(Message)]
+#[rtype(result = "Option<String>")]
 pub struct SendGoal<const N: usize> {
     /// The goal.
     pub goal: GoalRequest<N>,
@@ -108,46 +164,16 @@ pub struct SendGoal<const N: usize> {
     pub owner: Recipient<GoalReport<N>>,
 }
 
-impl<const N: usize> Ask for SendGoal<N> {
-    type Answer = Result<String, Unreachable>;
+/// For the owner in its [`SendGoal`].
+impl<const N: usize> Message for GoalReport<N> {
+    type Result = ();
 }
 
-/// The progress of a goal, for the owner in its [`SendGoal`].
-#[derive(Message, Debug, Clone, PartialEq)]
-#[rtype(result = "()")]
-pub struct GoalReport<const N: usize> {
-    /// The goal.
-    pub goal: AcceptedGoal<N>,
-    /// Its progress, or its end.
-    pub progress: GoalProgress<N>,
-}
-
-impl<const N: usize> Goal for GoalRequest<N> {
+impl<const N: usize> SentGoal for GoalRequest<N> {
     const ACTION: Action = Action::MoveTo;
 
     fn read(arguments: &Arguments) -> Result<Self, Rejections> {
-        <Self as Callable>::read(Service::SendGoal, arguments)
-    }
-}
-
-/// A client that has sent a goal by the action. Feedback shows that it was accepted.
-struct GoalSender(Arc<ActionClient>);
-
-impl Asker<Result<String, Unreachable>> for GoalSender {
-    fn answer(
-        self: Box<Self>,
-        answer: Result<Result<String, Unreachable>, Unserved>,
-        _: Option<Working>,
-    ) {
-        match answer {
-            Ok(Ok(_)) => {}
-            Ok(Err(why)) => self.0.refuse(&why.to_string()),
-            Err(why) => self.0.refuse(&why.to_string()),
-        }
-    }
-
-    fn warn(&self, why: &str) {
-        self.0.warn(why);
+        <Self as Ask>::read(Service::SendGoal, arguments)
     }
 }
 
@@ -162,22 +188,44 @@ impl<const N: usize> Actor for IkAction<N> {
 impl<const N: usize> Handler<Call<GoalRequest<N>>> for IkAction<N> {
     type Result = ();
 
-    fn handle(&mut self, Call { ask, reply }: Call<GoalRequest<N>>, ctx: &mut Context<Self>) {
-        self.start_goal(ask, None, reply, ctx);
+    fn handle(&mut self, Call { ask, mut reply }: Call<GoalRequest<N>>, ctx: &mut Context<Self>) {
+        let begun = self.begin(ask, GoalOwner::Subscribers, ctx);
+        ctx.wait(begun.map(move |begun, node, _| match begun {
+            Ok(Ok((goal, obstacle))) => {
+                if let Some(obstacle) = obstacle {
+                    reply.warn(&obstacle.to_string());
+                }
+                reply.answer(Ok(goal.id.clone()));
+                node.set_in_motion(goal);
+            }
+            Ok(Err(why)) => reply.conclude(Err(why)),
+            Err(why) => reply.refuse(why),
+        }));
     }
 }
 
-impl<const N: usize> Handler<Call<SendGoal<N>>> for IkAction<N> {
-    type Result = ();
+impl<const N: usize> Handler<SendGoal<N>> for IkAction<N> {
+    type Result = AtomicResponse<Self, Option<String>>;
 
-    fn handle(&mut self, Call { ask, reply }: Call<SendGoal<N>>, ctx: &mut Context<Self>) {
-        self.start_goal(ask.goal, Some(GoalOwner::Node(ask.owner)), reply, ctx);
+    fn handle(
+        &mut self,
+        SendGoal { goal, owner }: SendGoal<N>,
+        ctx: &mut Context<Self>,
+    ) -> Self::Result {
+        let begun = self.begin(goal, GoalOwner::Node(owner), ctx);
+        AtomicResponse::new(Box::pin(begun.map(|begun, node, _| {
+            let (goal, _) = begun.ok()?.ok()?;
+            let id = goal.id.clone();
+            node.set_in_motion(goal);
+            Some(id)
+        })))
     }
 }
 
 impl<const N: usize> Handler<ForwardGoal<GoalRequest<N>>> for IkAction<N> {
     type Result = ();
 
+    /// Feedback shows the client that its goal was accepted.
     fn handle(&mut self, forwarded: ForwardGoal<GoalRequest<N>>, ctx: &mut Context<Self>) {
         let ForwardGoal {
             goal,
@@ -185,8 +233,20 @@ impl<const N: usize> Handler<ForwardGoal<GoalRequest<N>>> for IkAction<N> {
             working,
         } = forwarded;
         let client = Arc::new(client);
-        let reply = Reply::new(GoalSender(Arc::clone(&client)), Some(working));
-        self.start_goal(goal, Some(GoalOwner::Client(client)), reply, ctx);
+        let begun = self.begin(goal, GoalOwner::Client(Arc::clone(&client)), ctx);
+        ctx.wait(begun.map(move |begun, node, _| {
+            match begun {
+                Ok(Ok((goal, obstacle))) => {
+                    if let Some(obstacle) = obstacle {
+                        client.warn(&obstacle.to_string());
+                    }
+                    node.set_in_motion(goal);
+                }
+                Ok(Err(why)) => client.refuse(&why.to_string()),
+                Err(why) => client.refuse(&why.to_string()),
+            }
+            drop(working);
+        }));
     }
 }
 
@@ -195,14 +255,12 @@ impl<const N: usize> Handler<CancelSent> for IkAction<N> {
 
     /// The client is informed if that goal is not active. Otherwise the goal's result is the answer.
     fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
-        let is_meant = |goal: &&ActiveGoal<N>| match &goal.owner {
-            Some(GoalOwner::Client(client)) => cancel.is_of(client),
-            _ => cancel.all,
+        let number = match self.goals.active() {
+            Some((goal, GoalOwner::Client(client))) if cancel.is_of(client) => goal.number,
+            Some((goal, GoalOwner::Subscribers | GoalOwner::Node(_))) if cancel.all => goal.number,
+            _ => return cancel.refuse(NOT_ACTIVE),
         };
-        let Some(goal) = self.active.as_ref().filter(is_meant) else {
-            return cancel.refuse(NOT_ACTIVE);
-        };
-        let ended = self.end(goal.goal.number, GoalStatus::Canceled);
+        let ended = self.end(number, GoalStatus::Canceled);
         ctx.wait(ended.map(move |_, _, _| drop(cancel.working)));
     }
 }
@@ -212,14 +270,11 @@ impl<const N: usize> Handler<Call<CancelRequest>> for IkAction<N> {
 
     fn handle(&mut self, call: Call<CancelRequest>, ctx: &mut Context<Self>) {
         let Call { ask, mut reply } = call;
-        let Some(ActiveGoal { goal, .. }) = &self.active else {
-            return reply.answer(Err(CancelRejected::NotActive));
+        let number = match self.goals.to_cancel(ask.goal_id.as_deref()) {
+            Ok(number) => number,
+            Err(why) => return reply.answer(Err(why)),
         };
-        if ask.goal_id.is_some_and(|id| id != goal.id) {
-            let active = goal.id.clone();
-            return reply.answer(Err(CancelRejected::OtherGoal { active }));
-        }
-        let ended = self.end(goal.number, GoalStatus::Canceled);
+        let ended = self.end(number, GoalStatus::Canceled);
         ctx.wait(ended.map(move |ended, _, _| reply.answer(ended)));
     }
 }
@@ -228,9 +283,9 @@ impl<const N: usize> Handler<ShutDown> for IkAction<N> {
     type Result = ResponseActFuture<Self, ()>;
 
     fn handle(&mut self, _: ShutDown, _: &mut Context<Self>) -> Self::Result {
-        match &self.active {
-            Some(goal) => {
-                let ended = self.end(goal.goal.number, GoalStatus::Aborted);
+        match self.goals.active() {
+            Some((goal, _)) => {
+                let ended = self.end(goal.number, GoalStatus::Aborted);
                 Box::pin(ended.map(|_, _, _| ()))
             }
             None => Box::pin(actix::fut::ready(())),
@@ -241,16 +296,9 @@ impl<const N: usize> Handler<ShutDown> for IkAction<N> {
 impl<const N: usize> Handler<GoalProgress<N>> for IkAction<N> {
     type Result = ();
 
-    /// From the arm. News of a goal that is no longer active are discarded.
     fn handle(&mut self, progress: GoalProgress<N>, _: &mut Context<Self>) {
-        if progress.outcome.is_some() {
-            self.conclude(&progress);
-        } else if let Some(goal) = self.active.as_ref().filter(|goal| goal.is(&progress)) {
-            let accepted = goal.goal.clone();
-            let feedback = move || accepted.feedback(progress.distance, progress.elapsed);
-            self.publish(Topic::IkFeedback, feedback);
-            goal.inform_owner(&progress);
-        }
+        let report = self.goals.report(progress);
+        self.pass_on(report, GoalStatus::Aborted);
     }
 }
 
@@ -258,139 +306,4 @@ impl<const N: usize> Handler<Barrier> for IkAction<N> {
     type Result = ();
 
     fn handle(&mut self, _: Barrier, _: &mut Context<Self>) {}
-}
-
-// ---- helpers --------------------------------------------------------------------------------------------------------
-
-impl<const N: usize> ActiveGoal<N> {
-    fn is(&self, progress: &GoalProgress<N>) -> bool {
-        self.goal.number == progress.number
-    }
-
-    /// Informs its owner of feedback or of its end.
-    fn inform_owner(&self, progress: &GoalProgress<N>) {
-        match &self.owner {
-            None => {}
-            Some(GoalOwner::Client(client)) => {
-                let distance = progress.distance;
-                let status = match progress.outcome {
-                    None => {
-                        return client.feed_back(self.goal.feedback(distance, progress.elapsed));
-                    }
-                    Some(Outcome::Reached) => GoalStatus::Succeeded,
-                    Some(Outcome::Preempted) => self.if_preempted,
-                };
-                client.conclude(self.goal.result(distance, progress.outcome), status);
-            }
-            Some(GoalOwner::Node(owner)) => owner.do_send(GoalReport {
-                goal: self.goal.clone(),
-                progress: *progress,
-            }),
-        }
-    }
-}
-
-impl<const N: usize> IkAction<N> {
-    /// Starts a goal. Its sender is answered before it is set in motion.
-    fn start_goal(
-        &mut self,
-        goal: GoalRequest<N>,
-        owner: Option<GoalOwner<N>>,
-        mut reply: Reply<Result<String, Unreachable>>,
-        ctx: &mut Context<Self>,
-    ) {
-        let GoalRequest { target, criteria } = goal;
-        let order = GoalOrder {
-            number: self.accepted + 1,
-            target,
-            criteria,
-        };
-        let begun = self.arm.track.send(TrackGoal {
-            goal: order,
-            owner: ctx.address().recipient(),
-        });
-        ctx.wait(begun.into_actor(self).map(move |tracking, node, _| {
-            let Ok(tracking) = tracking else {
-                return reply.refuse(Unserved::NO_ARM);
-            };
-            let is_accepted = tracking.is_ok();
-            if let Ok(Some(obstacle)) = tracking.as_ref().map(|tracking| tracking.obstacle) {
-                reply.warn(&obstacle.to_string());
-            }
-            reply.answer(tracking.map(|tracking| node.accept(&order, owner, tracking)));
-            if is_accepted {
-                node.set_in_motion();
-            }
-            drop(reply);
-        }));
-    }
-
-    /// Publishes the old goal's result and replaces it by the new goal.
-    fn accept(
-        &mut self,
-        order: &GoalOrder,
-        owner: Option<GoalOwner<N>>,
-        tracking: Tracking<N>,
-    ) -> String {
-        if let Some(before) = tracking.before {
-            self.conclude(&before);
-        }
-        let goal = AcceptedGoal::new(order.number, order.target, tracking.positions);
-        let id = goal.id.clone();
-        self.accepted = order.number;
-        self.active = Some(ActiveGoal {
-            goal,
-            owner,
-            if_preempted: GoalStatus::Aborted,
-        });
-        id
-    }
-
-    /// Sends the active goal's setpoint to the subscribers, and then to the arm.
-    fn set_in_motion(&self) {
-        let Some(goal) = &self.active else {
-            return;
-        };
-        let goal = goal.goal.clone();
-        let (number, positions) = (goal.number, goal.positions);
-        self.publish(Topic::JointTrajectory, move || goal.trajectory());
-        self.arm.command.do_send(CommandGoal { number, positions });
-    }
-
-    /// Preempts the active goal, unless the arm has reached it already. Its client gets that `status`.
-    fn end(
-        &self,
-        number: u64,
-        status: GoalStatus,
-    ) -> impl ActorFuture<Self, Output = Result<(), CancelRejected>> + use<N> {
-        let ended = self.arm.end.send(EndGoal { number }).into_actor(self);
-        ended.map(move |ended, node, _| {
-            // An arm that has ended has no goal.
-            let ended = ended.ok().flatten().ok_or(CancelRejected::NotActive)?;
-            if let Some(goal) = &mut node.active {
-                goal.if_preempted = status;
-            }
-            node.conclude(&ended);
-            match ended.outcome {
-                Some(Outcome::Preempted) => Ok(()),
-                _ => Err(CancelRejected::NotActive),
-            }
-        })
-    }
-
-    /// Publishes the result of the goal and removes it. Does nothing if another goal is active.
-    fn conclude(&mut self, progress: &GoalProgress<N>) {
-        let Some(goal) = self.active.take_if(|goal| goal.is(progress)) else {
-            return;
-        };
-        let (accepted, progress) = (goal.goal.clone(), *progress);
-        let result = move || accepted.result(progress.distance, progress.outcome);
-        self.publish(Topic::IkResult, result);
-        goal.inform_owner(&progress);
-    }
-
-    /// The registry makes the message, if the topic has subscribers.
-    fn publish<M: Serialize>(&self, topic: Topic, make: impl FnOnce() -> M + Send + 'static) {
-        self.publish.do_send(Publish::made(topic, make));
-    }
 }

@@ -1,7 +1,7 @@
 //! Timed trials: `/ik_trial/start`, `/ik_trial/skip`, `/ik_trial/stop`, and the topic `/ik_trial/status`.
 //!
-//! The rules are in `math::trial`. The node requests lengths and simulation time from the arm before each action,
-//! and moves the arm only through `ik_action`. Its request there is completed before it handles its next message.
+//! The rules are in `live::ik_trial`. The node requests the arm's pose before each action, and moves the arm only
+//! through `ik_action`. Its request there is completed before it handles its next message.
 //!
 //! **Invariant:** time and news of goals are handled in the order in which the arm sent them. No timer runs without a
 //! trial or a subscriber.
@@ -13,9 +13,9 @@ use actix::prelude::*;
 use super::ik_action::{CancelRequest, GoalReport, GoalRequest, SendGoal};
 use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Barrier, Call, Interest, Nodes, Publish, Reply, Unserved, ask};
-use crate::math::trial::{Conclusion, Trial, TrialCommand, sample};
+use crate::live::{GoalAnswer, IkTrials};
+use crate::math::trial::TrialCommand;
 use crate::protocol::catalog::{Service, Topic};
-use crate::services::trial::status_message;
 pub use crate::services::trial::{STATUS_PERIOD, Terms, TrialRefused, TrialRequest};
 
 /// Least time between two checks whether a trial is over. The rest of a trial may take long if the arm is paused or
@@ -33,12 +33,7 @@ pub struct IkTrial<const N: usize> {
     observes: bool,
     goals: GoalClient<N>,
     publish: Recipient<Publish>,
-    trial: Trial,
-    rng: fastrand::Rng,
-    /// The last known lengths \[m\].
-    lengths: [f64; N],
-    /// The last known number of resets, and simulation time over all of them \[s\].
-    clock: (u64, f64),
+    trial: IkTrials<N>,
     status_wanted: bool,
     /// A timer for `/ik_trial/status`, while it has subscribers.
     status_timer: Option<SpawnHandle>,
@@ -55,17 +50,14 @@ impl<const N: usize> IkTrial<N> {
         arm: TrialArm<N>,
         goals: GoalClient<N>,
         publish: Recipient<Publish>,
-        rng: fastrand::Rng,
+        mut rng: fastrand::Rng,
     ) -> Self {
         Self {
             arm,
             observes: false,
             goals,
             publish,
-            trial: Trial::default(),
-            rng,
-            lengths: [1.0; N],
-            clock: (0, 0.0),
+            trial: IkTrials::new(move || rng.f64()),
             status_wanted: false,
             status_timer: None,
             status_asked: false,
@@ -81,12 +73,151 @@ impl<const N: usize> IkTrial<N> {
         let node = address.clone().recipient();
         nodes.publishers.insert(Topic::TrialStatus, node);
     }
+
+    /// Sends a request to the arm, and continues after all its earlier news. They are in this node's mailbox before the
+    /// barrier is answered, and an actor empties its mailbox before it continues a future.
+    fn ask_arm(&self, intent: Intent, ctx: &mut Context<Self>) {
+        let (arm, barrier) = (self.arm.pose.clone(), self.goals.barrier.clone());
+        let question = async move {
+            let pose = arm.send(ArmPose).await.ok();
+            let _ = barrier.send(Barrier).await;
+            pose
+        };
+        let asked = question.into_actor(self);
+        ctx.spawn(asked.map(move |pose, node, ctx| node.act(pose, intent, ctx)));
+    }
+
+    /// Does the next action at this pose of the arm; `None` if the arm has ended.
+    fn act(&mut self, pose: Option<Pose<N>>, intent: Intent, ctx: &mut Context<Self>) {
+        let Some(pose) = pose else {
+            // Without an arm there is nothing to do.
+            if let Intent::Perform(mut call) = intent {
+                call.reply.refuse(Unserved::NO_ARM);
+            }
+            return;
+        };
+        let mut commands = self.trial.tick(&pose);
+        match intent {
+            Intent::CheckDeadline => self.carry_out(commands, None, ctx),
+            Intent::ShowStatus => {
+                self.status_asked = false;
+                commands.push(TrialCommand::PublishStatus);
+                self.carry_out(commands, None, ctx);
+            }
+            Intent::Perform(call) => {
+                let Call { ask, mut reply } = *call;
+                match self.trial.decide(ask, &pose) {
+                    Ok((more, obstacle)) => {
+                        // A new trial has another one.
+                        self.cancel_deadline(ctx);
+                        if let Some(obstacle) = obstacle {
+                            reply.warn(&obstacle.to_string());
+                        }
+                        commands.extend(more);
+                        self.carry_out(commands, Some(reply), ctx);
+                    }
+                    Err(why) => {
+                        self.carry_out(commands, None, ctx);
+                        reply.answer(self.trial.terms(Err(why)));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Executes the trial's commands, then answers the call that caused them.
+    fn carry_out(
+        &mut self,
+        commands: Vec<TrialCommand>,
+        reply: Option<Reply<Terms>>,
+        ctx: &mut Context<Self>,
+    ) {
+        let mut about_goals = Vec::new();
+        for command in commands {
+            match command {
+                TrialCommand::PublishStatus => self.publish_status(),
+                command => about_goals.push(command),
+            }
+        }
+        self.keep_timers(ctx);
+        if about_goals.is_empty() {
+            if let Some(mut reply) = reply {
+                reply.answer(self.trial.terms(Ok(())));
+            }
+            return;
+        }
+        let answered = send_in_turn(
+            about_goals,
+            self.arm.pose.clone(),
+            self.goals.clone(),
+            ctx.address().recipient(),
+        );
+        ctx.wait(answered.into_actor(self).map(move |answers, node, ctx| {
+            let answers = answers.into_iter();
+            let commands = answers
+                .flat_map(|answer| node.trial.answered(answer))
+                .collect();
+            node.carry_out(commands, reply, ctx);
+        }));
+    }
+
+    fn publish_status(&self) {
+        if let Some(status) = self.trial.status().filter(|_| self.status_wanted) {
+            let message = Publish::made(Topic::TrialStatus, move || status);
+            self.publish.do_send(message);
+        }
+    }
+
+    /// Sets the timers of the present state, and no others. A running trial observes the arm, also without a goal.
+    fn keep_timers(&mut self, ctx: &mut Context<Self>) {
+        let running = self.trial.trial().running();
+        if std::mem::replace(&mut self.observes, running) != running {
+            self.arm.interest.do_send(Interest {
+                topic: Topic::TrialStatus,
+                wanted: running,
+            });
+        }
+        match self.trial.trial().remaining() {
+            None => self.cancel_deadline(ctx),
+            Some(remaining) if self.deadline.is_none() => {
+                let nap = Duration::try_from_secs_f64(remaining).unwrap_or(LONGEST_NAP);
+                let nap = nap.clamp(SHORTEST_NAP, LONGEST_NAP);
+                self.deadline = Some(ctx.run_later(nap, |node, ctx| {
+                    node.deadline = None;
+                    node.ask_arm(Intent::CheckDeadline, ctx);
+                }));
+            }
+            Some(_) => {}
+        }
+        let is_watched = self.status_wanted && self.trial.trial().status().is_some();
+        if is_watched && self.status_timer.is_none() {
+            self.status_timer = Some(ctx.run_interval(STATUS_PERIOD, Self::status_due));
+        } else if !is_watched && let Some(timer) = self.status_timer.take() {
+            ctx.cancel_future(timer);
+        }
+    }
+
+    fn cancel_deadline(&mut self, ctx: &mut Context<Self>) {
+        if let Some(timer) = self.deadline.take() {
+            ctx.cancel_future(timer);
+        }
+    }
+
+    /// A status has the present time. While a trial runs, the arm provides it.
+    fn status_due(&mut self, ctx: &mut Context<Self>) {
+        if !self.trial.trial().running() {
+            self.publish_status();
+        } else if !self.status_asked {
+            self.status_asked = true;
+            self.ask_arm(Intent::ShowStatus, ctx);
+        }
+    }
 }
 
 /// The node's next action, once it has lengths and time.
 enum Intent {
     /// Performs a request.
-    Perform(TrialRequest, Reply<Terms>),
+    Perform(Box<Call<TrialRequest>>),
     /// The trial may be over.
     CheckDeadline,
     /// A status is due.
@@ -105,13 +236,7 @@ impl<const N: usize> Handler<Call<TrialRequest>> for IkTrial<N> {
     type Result = ();
 
     fn handle(&mut self, call: Call<TrialRequest>, ctx: &mut Context<Self>) {
-        let Call { ask, mut reply } = call;
-        match ask {
-            TrialRequest::Start { rejected, .. } if !rejected.is_empty() => {
-                reply.answer(self.terms(Err(TrialRefused::Rejected(rejected))));
-            }
-            ask => self.ask_arm(Intent::Perform(ask, reply), ctx),
-        }
+        self.ask_arm(Intent::Perform(Box::new(call)), ctx);
     }
 }
 
@@ -119,22 +244,8 @@ impl<const N: usize> Handler<GoalReport<N>> for IkTrial<N> {
     type Result = ();
 
     fn handle(&mut self, news: GoalReport<N>, ctx: &mut Context<Self>) {
-        let GoalReport { goal, progress } = news;
-        let mut commands = self.note_pose(&progress.pose);
-        let distance = progress.distance;
-        match progress.outcome {
-            None => self.trial.feedback(&goal.id, distance, &goal.positions),
-            Some(outcome) => {
-                let conclusion = Conclusion {
-                    goal_id: goal.id,
-                    outcome,
-                    final_distance: distance,
-                };
-                let target = || sample(&self.lengths, || self.rng.f64());
-                commands.extend(self.trial.concluded(conclusion, target));
-            }
-        }
-        self.perform(commands, None, ctx);
+        let commands = self.trial.report(news);
+        self.carry_out(commands, None, ctx);
     }
 }
 
@@ -144,190 +255,6 @@ impl<const N: usize> Handler<Interest> for IkTrial<N> {
     fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
         self.status_wanted = interest.wanted;
         self.keep_timers(ctx);
-    }
-}
-
-// ---- helpers --------------------------------------------------------------------------------------------------------
-
-impl<const N: usize> IkTrial<N> {
-    /// Sends a request to the arm, and continues after all its earlier news. They are in this node's mailbox before the
-    /// barrier is answered, and an actor empties its mailbox before it continues a future.
-    fn ask_arm(&self, intent: Intent, ctx: &mut Context<Self>) {
-        let (arm, barrier) = (self.arm.pose.clone(), self.goals.barrier.clone());
-        let question = async move {
-            let pose = arm.send(ArmPose).await.ok();
-            let _ = barrier.send(Barrier).await;
-            pose
-        };
-        let asked = question.into_actor(self);
-        ctx.spawn(asked.map(move |pose, node, ctx| node.act(pose, intent, ctx)));
-    }
-
-    /// Does the next action at this pose of the arm; `None` if the arm has ended.
-    fn act(&mut self, pose: Option<Pose<N>>, intent: Intent, ctx: &mut Context<Self>) {
-        let Some(pose) = pose else {
-            // Without an arm there is nothing to do.
-            if let Intent::Perform(_, mut reply) = intent {
-                reply.refuse(Unserved::NO_ARM);
-            }
-            return;
-        };
-        let mut commands = self.note_pose(&pose);
-        let target = || sample(&self.lengths, || self.rng.f64());
-        let (decided, reply) = match intent {
-            Intent::Perform(ask, reply) => {
-                let moves_arm = ask != TrialRequest::Stop;
-                let decided = match ask {
-                    TrialRequest::Start { changes, .. } => {
-                        let decided = self.trial.start(self.clock.1, changes, target);
-                        if decided.is_ok() {
-                            self.cancel_deadline(ctx);
-                        }
-                        decided
-                    }
-                    TrialRequest::Skip => self.trial.skip(target),
-                    TrialRequest::Stop => self.trial.stop(),
-                };
-                if let (true, true, Some(obstacle)) = (decided.is_ok(), moves_arm, pose.obstacle) {
-                    reply.warn(&obstacle.to_string());
-                }
-                (decided, Some(reply))
-            }
-            Intent::CheckDeadline => (Ok(Vec::new()), None),
-            Intent::ShowStatus => {
-                self.status_asked = false;
-                (Ok(vec![TrialCommand::PublishStatus]), None)
-            }
-        };
-        match decided {
-            Ok(more) => {
-                commands.extend(more);
-                self.perform(commands, reply, ctx);
-            }
-            Err(why) => {
-                self.perform(commands, None, ctx);
-                self.answer(reply, Err(why.into()));
-            }
-        }
-    }
-
-    /// Stores lengths and time. Two requests may be answered in either order, so the later time counts.
-    fn note_pose(&mut self, pose: &Pose<N>) -> Vec<TrialCommand> {
-        self.lengths = pose.lengths;
-        let latest = (pose.resets, pose.simulated);
-        if latest > self.clock {
-            self.clock = latest;
-        }
-        self.trial.tick(self.clock.1)
-    }
-
-    /// Executes the trial's commands, then answers the call that caused them.
-    fn perform(
-        &mut self,
-        commands: Vec<TrialCommand>,
-        reply: Option<Reply<Terms>>,
-        ctx: &mut Context<Self>,
-    ) {
-        let mut about_goals = Vec::new();
-        for command in commands {
-            match command {
-                TrialCommand::PublishStatus => self.publish_status(),
-                command => about_goals.push(command),
-            }
-        }
-        self.keep_timers(ctx);
-        if about_goals.is_empty() {
-            return self.answer(reply, Ok(()));
-        }
-        let carried_out = carry_out(
-            about_goals,
-            self.arm.pose.clone(),
-            self.goals.clone(),
-            ctx.address().recipient(),
-        );
-        ctx.wait(carried_out.into_actor(self).map(move |answers, node, ctx| {
-            let commands = answers
-                .into_iter()
-                .flat_map(|answer| node.goal_answered(answer))
-                .collect();
-            node.perform(commands, reply, ctx);
-        }));
-    }
-
-    fn goal_answered(&mut self, answer: GoalAnswer<N>) -> Vec<TrialCommand> {
-        self.lengths = answer.lengths.unwrap_or(self.lengths);
-        let target = || sample(&self.lengths, || self.rng.f64());
-        match answer.goal_id {
-            Some(goal_id) => self.trial.accepted(answer.ticket, &goal_id, target),
-            None => self.trial.refused(answer.ticket, target),
-        }
-    }
-
-    fn answer(&self, reply: Option<Reply<Terms>>, outcome: Result<(), TrialRefused>) {
-        if let Some(mut reply) = reply {
-            reply.answer(self.terms(outcome));
-        }
-    }
-
-    fn terms(&self, outcome: Result<(), TrialRefused>) -> Terms {
-        Terms {
-            settings: self.trial.settings(),
-            outcome,
-        }
-    }
-
-    fn publish_status(&self) {
-        let Some(status) = self.trial.status().filter(|_| self.status_wanted) else {
-            return;
-        };
-        let message = status_message(&status);
-        self.publish
-            .do_send(Publish::made(Topic::TrialStatus, move || message));
-    }
-
-    /// Sets the timers of the present state, and no others. A running trial observes the arm, also without a goal.
-    fn keep_timers(&mut self, ctx: &mut Context<Self>) {
-        let running = self.trial.running();
-        if std::mem::replace(&mut self.observes, running) != running {
-            self.arm.interest.do_send(Interest {
-                topic: Topic::TrialStatus,
-                wanted: running,
-            });
-        }
-        match self.trial.remaining() {
-            None => self.cancel_deadline(ctx),
-            Some(remaining) if self.deadline.is_none() => {
-                let nap = Duration::try_from_secs_f64(remaining).unwrap_or(LONGEST_NAP);
-                let nap = nap.clamp(SHORTEST_NAP, LONGEST_NAP);
-                self.deadline = Some(ctx.run_later(nap, |node, ctx| {
-                    node.deadline = None;
-                    node.ask_arm(Intent::CheckDeadline, ctx);
-                }));
-            }
-            Some(_) => {}
-        }
-        let is_watched = self.status_wanted && self.trial.status().is_some();
-        if is_watched && self.status_timer.is_none() {
-            self.status_timer = Some(ctx.run_interval(STATUS_PERIOD, Self::status_due));
-        } else if !is_watched && let Some(timer) = self.status_timer.take() {
-            ctx.cancel_future(timer);
-        }
-    }
-
-    fn cancel_deadline(&mut self, ctx: &mut Context<Self>) {
-        if let Some(timer) = self.deadline.take() {
-            ctx.cancel_future(timer);
-        }
-    }
-
-    /// A status has the present time. While a trial runs, the arm provides it.
-    fn status_due(&mut self, ctx: &mut Context<Self>) {
-        if !self.trial.running() {
-            self.publish_status();
-        } else if !self.status_asked {
-            self.status_asked = true;
-            self.ask_arm(Intent::ShowStatus, ctx);
-        }
     }
 }
 
@@ -346,24 +273,15 @@ pub struct TrialArm<const N: usize> {
 #[derive(Clone)]
 pub struct GoalClient<const N: usize> {
     /// Sends a goal.
-    pub send: Recipient<Call<SendGoal<N>>>,
+    pub send: Recipient<SendGoal<N>>,
     /// Cancels it.
     pub cancel: Recipient<Call<CancelRequest>>,
     /// Waits until all earlier news have arrived.
     pub barrier: Recipient<Barrier>,
 }
 
-/// The answer of `ik_action` to a goal of the trial.
-struct GoalAnswer<const N: usize> {
-    ticket: u64,
-    /// The goal's id, if it was accepted.
-    goal_id: Option<String>,
-    /// Lengths after a refusal \[m\], which may have been the reason.
-    lengths: Option<[f64; N]>,
-}
-
 /// Sends the trial's commands to `ik_action`, one after another.
-async fn carry_out<const N: usize>(
+async fn send_in_turn<const N: usize>(
     commands: Vec<TrialCommand>,
     arm: Recipient<ArmPose<N>>,
     goals: GoalClient<N>,
@@ -386,7 +304,7 @@ async fn carry_out<const N: usize>(
                     goal: GoalRequest { target, criteria },
                     owner: owner.clone(),
                 };
-                let goal_id = ask(&goals.send, goal).await.ok().and_then(Result::ok);
+                let goal_id = goals.send.send(goal).await.ok().flatten();
                 let lengths = match goal_id {
                     Some(_) => None,
                     None => arm.send(ArmPose).await.ok().map(|pose| pose.lengths),

@@ -65,7 +65,7 @@ impl LongFrames {
             LongFrame::Unread(frame) => {
                 let length = frame.len();
                 if length > MEDIUM {
-                    self.take_room(memory).await;
+                    self.take_memory(memory).await;
                 }
                 (parse(length, move || frame).await?, length)
             }
@@ -75,13 +75,13 @@ impl LongFrames {
         };
         let is_published = matches!(op, Ok(Op::Publish { .. } | Op::Fragment(_)));
         if length > SHORT && !is_published {
-            self.take_room(memory).await;
+            self.take_memory(memory).await;
         }
         let Ok(Op::Fragment(piece)) = op else {
             return Ok(Some((Incoming { id, op }, length)));
         };
         if self.fragments.allocated() + length > SHORT {
-            self.take_room(memory).await;
+            self.take_memory(memory).await;
         }
         let whole = match self.fragments.take(piece, Instant::now().into_std()) {
             Ok(Some(whole)) => whole,
@@ -103,7 +103,7 @@ impl LongFrames {
     }
 
     /// Takes the memory permit, unless the client has it.
-    async fn take_room(&mut self, memory: &Memory) {
+    async fn take_memory(&mut self, memory: &Memory) {
         if self.permit.is_none() {
             self.hold(memory.long_frame().await);
         }

@@ -95,7 +95,7 @@ impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
         let (asker, answered) = oneshot::channel();
         let computing = answer(
             self.workers.clone(),
-            Reply::new(asker, None),
+            Reply::to_node(asker, None),
             Limiting(control),
         );
         Box::pin(async move {

@@ -11,7 +11,6 @@ use serde::Serialize;
 use tokio::time::timeout;
 
 use super::completion::{Completion, Working};
-use super::questions::{Asker, Reserving, Unserved};
 use super::registry::{ClientLink, FrameKind};
 use crate::actors::resources::memory::{Memory, PERMIT_TIME, Permit, SHORT, cover};
 use crate::protocol::catalog::{Service, Topic};
@@ -19,6 +18,22 @@ use crate::protocol::messages::Level;
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::json::Payload;
 use crate::services::Address;
+
+/// Why a question has no answer. It has had no effect, and will have none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Unserved(pub &'static str);
+
+impl Unserved {
+    /// The node dropped the question.
+    pub const ENDED: Self = Self("the node that serves this ended before it answered");
+    /// The arm has ended.
+    pub const NO_ARM: Self = Self("arm_sim does not answer");
+    /// The caller has disconnected.
+    pub const CALLER_GONE: Self = Self("the caller is gone");
+    /// Other answers have used the memory for too long.
+    pub const NO_MEMORY: Self = Self("other long answers use the memory; call again later");
+}
 
 /// A call of one of the runtime's own services, forwarded by the registry.
 pub struct ServiceCall {
@@ -99,6 +114,16 @@ impl Caller {
         self.link.is_gone()
     }
 
+    /// The same, and asks the system, which takes some microseconds.
+    pub(super) fn has_left(&self) -> bool {
+        self.link.gone.look()
+    }
+
+    /// Sends a status, before the answer.
+    pub(super) fn warn(&self, why: &str) {
+        self.link.status(Level::Warning, why, self.id());
+    }
+
     /// Waits for memory for an answer of at most `bytes` bytes, besides the echo of the caller's `id`, before it is
     /// computed. A caller whose frame has a permit waits for at most [`PERMIT_TIME`].
     ///
@@ -138,7 +163,11 @@ impl Caller {
     }
 
     /// Answers, unless that has been done.
-    fn answer(&mut self, working: Option<Working>, write: impl FnOnce(&Address) -> Bytes) {
+    pub(super) fn answer(
+        &mut self,
+        working: Option<Working>,
+        write: impl FnOnce(&Address) -> Bytes,
+    ) {
         if let Some(address) = self.address.take() {
             let permit = self.answer_permit.as_ref().or(self.frame_permit.as_ref());
             let frame = cover(permit, write(&address));
@@ -151,39 +180,5 @@ impl Caller {
 impl Drop for Caller {
     fn drop(&mut self) {
         self.refuse(&Unserved::ENDED.to_string());
-    }
-}
-
-/// A client that has asked for a `T`.
-pub(super) struct ClientAsker<T> {
-    pub(super) caller: Caller,
-    /// Writes the answer.
-    pub(super) write: fn(T, &Address) -> Bytes,
-}
-
-impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
-    fn answer(self: Box<Self>, answer: Result<T, Unserved>, working: Option<Working>) {
-        let Self { mut caller, write } = *self;
-        caller.answer(working, |address| match answer {
-            Ok(answer) => write(answer, address),
-            Err(why) => address.failure(&why.to_string()),
-        });
-    }
-
-    fn is_gone(&self) -> bool {
-        self.caller.is_gone()
-    }
-
-    fn has_left(&self) -> bool {
-        self.caller.link.gone.look()
-    }
-
-    fn warn(&self, why: &str) {
-        let id = self.caller.id();
-        self.caller.link.status(Level::Warning, why, id);
-    }
-
-    fn reserve(&mut self, bytes: usize) -> Reserving<'_> {
-        Box::pin(self.caller.reserve(bytes))
     }
 }

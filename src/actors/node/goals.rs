@@ -25,7 +25,7 @@ pub enum ActionRequest {
 }
 
 /// A goal that clients send by an action.
-pub trait Goal: Sized + Send + 'static {
+pub trait SentGoal: Sized + Send + 'static {
     /// The action.
     const ACTION: Action;
 

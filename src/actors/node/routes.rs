@@ -7,14 +7,14 @@ use std::fmt::Display;
 
 use actix::prelude::*;
 
-use super::callers::{ClientAsker, ServiceCall, TopicMessage};
-use super::goals::{ActionRequest, CancelSent, ForwardGoal, Goal};
+use super::callers::{ServiceCall, TopicMessage};
+use super::goals::{ActionRequest, CancelSent, ForwardGoal, SentGoal};
 use super::questions::{Call, Reply};
 use super::registry::Interest;
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::wire::json::Payload;
-use crate::services::Answered;
+use crate::services::Ask;
 
 /// Arguments longer than this are read on a worker thread. Numbers near the middle between two doubles take 5 µs for
 /// each 24 bytes, so these take a fifth of a millisecond. Usual ones are shorter.
@@ -39,7 +39,7 @@ pub struct Nodes {
 impl Nodes {
     /// The node serves `service`: it gets each call as this question. The arguments are read here, and rejected ones
     /// are reported.
-    pub fn serve<A: Answered>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
+    pub fn serve<A: Ask>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
         let node = node.into();
         let take = move |call: ServiceCall| {
             let node = node.clone();
@@ -48,12 +48,7 @@ impl Nodes {
                 let mut caller = call.caller;
                 match A::read(call.service, &call.arguments) {
                     Ok(ask) => {
-                        let working = caller.working.take();
-                        let asker = ClientAsker {
-                            caller,
-                            write: A::write,
-                        };
-                        let reply = Reply::new(asker, working);
+                        let reply = Reply::to_client(caller, A::write);
                         node.do_send(Call { ask, reply });
                     }
                     Err(rejections) => caller.refuse(&rejections.status()),
@@ -85,7 +80,7 @@ impl Nodes {
     }
 
     /// The node serves the action of these goals: it gets goals and cancellations.
-    pub fn serve_action<G: Goal, A>(&mut self, node: Addr<A>)
+    pub fn serve_action<G: SentGoal, A>(&mut self, node: Addr<A>)
     where
         A: Actor<Context = Context<A>> + Handler<ForwardGoal<G>> + Handler<CancelSent>,
     {

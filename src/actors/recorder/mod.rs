@@ -71,79 +71,7 @@ impl<const N: usize> Recorder<N> {
         nodes.serve::<StartRecording>(Service::RecorderStart, address.clone());
         nodes.serve::<StopRecording>(Service::RecorderStop, address.clone());
     }
-}
 
-// ---- messages -------------------------------------------------------------------------------------------------------
-
-/// A record has ended by itself. From its thread.
-#[derive(Message)]
-#[rtype(result = "()")]
-struct RecordEnded(u64);
-
-// ---- life cycle -----------------------------------------------------------------------------------------------------
-
-impl<const N: usize> Actor for Recorder<N> {
-    type Context = Context<Self>;
-}
-
-// ---- handlers -------------------------------------------------------------------------------------------------------
-
-impl<const N: usize> Handler<Call<StartRecording>> for Recorder<N> {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<StartRecording>, ctx: &mut Context<Self>) {
-        let Call { ask, mut reply } = call;
-        let Some(folder) = &self.folder else {
-            return reply.answer(Err(NotRecorded::NoFolder));
-        };
-        let (name, target) = place(folder, ask.name);
-        let begun = self.begin(target, ctx);
-        ctx.wait(begun.map(move |begun, _, _| reply.answer(begun.map(|()| name))));
-    }
-}
-
-impl<const N: usize> Handler<Call<StopRecording>> for Recorder<N> {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<StopRecording>, ctx: &mut Context<Self>) {
-        let mut reply = call.reply;
-        if self.folder.is_none() {
-            return reply.answer(Err(NotRecorded::NoFolder));
-        }
-        if let Some(current) = self.current.as_ref().filter(|one| !one.by_client) {
-            return reply.answer(Err(NotRecorded::Operators(current.file.clone())));
-        }
-        let ended = self.end();
-        ctx.wait(ended.map(move |ended, _, _| reply.answer(ended.ok_or(NotRecorded::Nothing))));
-    }
-}
-
-impl<const N: usize> Handler<RecordTo> for Recorder<N> {
-    type Result = ResponseActFuture<Self, Result<(), NotRecorded>>;
-
-    fn handle(&mut self, RecordTo(path): RecordTo, ctx: &mut Context<Self>) -> Self::Result {
-        let limit = None;
-        match path {
-            Some(path) => Box::pin(self.begin(TapeTarget { path, limit }, ctx)),
-            None => Box::pin(self.end().map(|_, _, _| Ok(()))),
-        }
-    }
-}
-
-impl<const N: usize> Handler<RecordEnded> for Recorder<N> {
-    type Result = ();
-
-    fn handle(&mut self, RecordEnded(number): RecordEnded, ctx: &mut Context<Self>) {
-        let current = self.current.as_ref();
-        if current.is_some_and(|one| one.number == number) {
-            ctx.wait(self.end().map(|_, _, _| ()));
-        }
-    }
-}
-
-// ---- helpers --------------------------------------------------------------------------------------------------------
-
-impl<const N: usize> Recorder<N> {
     /// Starts a record, unless there is one.
     fn begin(
         &mut self,
@@ -217,6 +145,76 @@ impl<const N: usize> Recorder<N> {
     }
 }
 
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// A record has ended by itself. From its thread.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct RecordEnded(u64);
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Actor for Recorder<N> {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Handler<Call<StartRecording>> for Recorder<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<StartRecording>, ctx: &mut Context<Self>) {
+        let Call { ask, mut reply } = call;
+        let Some(folder) = &self.folder else {
+            return reply.answer(Err(NotRecorded::NoFolder));
+        };
+        let (name, target) = destination(folder, ask.name);
+        let begun = self.begin(target, ctx);
+        ctx.wait(begun.map(move |begun, _, _| reply.answer(begun.map(|()| name))));
+    }
+}
+
+impl<const N: usize> Handler<Call<StopRecording>> for Recorder<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<StopRecording>, ctx: &mut Context<Self>) {
+        let mut reply = call.reply;
+        if self.folder.is_none() {
+            return reply.answer(Err(NotRecorded::NoFolder));
+        }
+        if let Some(current) = self.current.as_ref().filter(|one| !one.by_client) {
+            return reply.answer(Err(NotRecorded::Operators(current.file.clone())));
+        }
+        let ended = self.end();
+        ctx.wait(ended.map(move |ended, _, _| reply.answer(ended.ok_or(NotRecorded::Nothing))));
+    }
+}
+
+impl<const N: usize> Handler<RecordTo> for Recorder<N> {
+    type Result = ResponseActFuture<Self, Result<(), NotRecorded>>;
+
+    fn handle(&mut self, RecordTo(path): RecordTo, ctx: &mut Context<Self>) -> Self::Result {
+        let limit = None;
+        match path {
+            Some(path) => Box::pin(self.begin(TapeTarget { path, limit }, ctx)),
+            None => Box::pin(self.end().map(|_, _, _| Ok(()))),
+        }
+    }
+}
+
+impl<const N: usize> Handler<RecordEnded> for Recorder<N> {
+    type Result = ();
+
+    fn handle(&mut self, RecordEnded(number): RecordEnded, ctx: &mut Context<Self>) {
+        let current = self.current.as_ref();
+        if current.is_some_and(|one| one.number == number) {
+            ctx.wait(self.end().map(|_, _, _| ()));
+        }
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
 /// Checks the folder for clients' records, as before each record.
 ///
 /// # Errors
@@ -231,7 +229,7 @@ pub fn check_folder(folder: &Path) -> Result<(), NotRecorded> {
 }
 
 /// The destination of a client's record with its file's name.
-fn place(folder: &Path, name: Option<String>) -> (String, TapeTarget) {
+fn destination(folder: &Path, name: Option<String>) -> (String, TapeTarget) {
     let made_up = || format!("run-{}", TapeClock::start().now());
     let mut name = name.unwrap_or_else(made_up);
     if !name.ends_with(".mcap") {
@@ -251,12 +249,12 @@ mod tests {
     #[test]
     fn a_clients_record_lies_in_the_folder_and_is_bounded() {
         for name in ["a", "a.mcap"] {
-            let (name, target) = place(Path::new("runs"), Some(name.to_owned()));
+            let (name, target) = destination(Path::new("runs"), Some(name.to_owned()));
             assert_eq!(name, "a.mcap");
             assert_eq!(target.path, Path::new("runs/a.mcap"));
             assert_eq!(target.limit, Some(MAX_RECORD_BYTES));
         }
-        let (name, _) = place(Path::new("runs"), None);
+        let (name, _) = destination(Path::new("runs"), None);
         assert!(
             name.starts_with("run-") && name.ends_with(".mcap"),
             "{name}"

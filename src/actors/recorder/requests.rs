@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::limits::MAX_FILE_NAME;
-use crate::actors::node::{Address, Answered, Ask, Callable};
+use crate::actors::node::{Address, Ask};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
@@ -23,17 +23,9 @@ pub struct StartRecording {
     pub name: Option<String>,
 }
 
-impl Ask for StartRecording {
-    type Answer = Result<String, NotRecorded>;
-}
-
 /// Ends the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StopRecording;
-
-impl Ask for StopRecording {
-    type Answer = Result<Recorded, NotRecorded>;
-}
 
 /// A finished record.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
@@ -93,7 +85,9 @@ pub enum NotRecorded {
 
 // ---- in JSON ---------------------------------------------------------------------------------------------------------
 
-impl Callable for StartRecording {
+impl Ask for StartRecording {
+    type Answer = Result<String, NotRecorded>;
+
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let name = fields.text("name").map(std::borrow::Cow::into_owned);
@@ -105,22 +99,20 @@ impl Callable for StartRecording {
         }
         fields.accept(Self { name })
     }
-}
 
-impl Answered for StartRecording {
     fn write(answer: Result<String, NotRecorded>, to: &Address) -> Bytes {
         to.outcome(answer.map(|file| json!({"file": file})))
     }
 }
 
-impl Callable for StopRecording {
+impl Ask for StopRecording {
+    type Answer = Result<Recorded, NotRecorded>;
+
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         Fields::read(arguments, service)?;
         Ok(Self)
     }
-}
 
-impl Answered for StopRecording {
     fn write(answer: Result<Recorded, NotRecorded>, to: &Address) -> Bytes {
         to.outcome(answer)
     }

@@ -86,7 +86,7 @@ pub(super) fn begin(
             if answer.send(Ok(Begun { tape, end })).is_err() {
                 return;
             }
-            let recorded = write((&file, writer), &queue, &counts, &target, over);
+            let recorded = write(&file, writer, &queue, &counts, &target, over);
             // The program may end without waiting for the file.
             let _ = ended.send(recorded);
         });
@@ -150,7 +150,7 @@ impl Tape {
             return false;
         }
         // Inputs are few and short, and a replay needs every one.
-        let room = match content {
+        let pool = match content {
             Content::Input { .. } => &self.for_inputs,
             _ => &self.for_topics,
         };
@@ -159,12 +159,12 @@ impl Tape {
             .allocated()
             .max(MAX_WAITING_BYTES / MAX_WAITING_ENTRIES);
         let bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
-        let place = Arc::clone(room).try_acquire_many_owned(bytes);
+        let permit = Arc::clone(pool).try_acquire_many_owned(bytes);
         let entry = RecordEntry {
             log_time: self.clock.now(),
             content,
         };
-        let is_put = place.is_ok_and(|place| self.entries.send((entry, place)).is_ok());
+        let is_put = permit.is_ok_and(|permit| self.entries.send((entry, permit)).is_ok());
         if !is_put {
             self.counts.dropped.fetch_add(1, Ordering::Relaxed);
         }
@@ -182,13 +182,14 @@ impl Tape {
 
 /// Writes entries until the last tape is dropped, the file fails, or the size limit is reached.
 fn write(
-    (file, mut writer): (&File, RecordWriter),
+    file: &File,
+    mut writer: RecordWriter,
     queue: &Receiver<Waiting>,
     counts: &TapeCounts,
     target: &TapeTarget,
     over: impl FnOnce(),
 ) -> Recorded {
-    let outcome = take_entries((file, &mut writer), queue, counts, target);
+    let outcome = take_entries(file, &mut writer, queue, counts, target);
     counts.is_over.store(true, Ordering::Relaxed);
     let messages = writer.messages();
     let finished = outcome.and_then(|is_last| writer.finish().map(|_| is_last));
@@ -218,7 +219,8 @@ fn write(
 
 /// Writes waiting entries. Returns `false` if the file has become too long.
 fn take_entries(
-    (file, writer): (&File, &mut RecordWriter),
+    file: &File,
+    writer: &mut RecordWriter,
     queue: &Receiver<Waiting>,
     counts: &TapeCounts,
     target: &TapeTarget,

@@ -4,7 +4,7 @@
 //! one client that needs only its own bytes is done here. Examples are reading a frame of megabytes, encoding a
 //! message, and writing a long list.
 //!
-//! **Invariant:** at most [`PLACES`] threads of one gateway work on each kind of work. Further work waits in order.
+//! **Invariant:** at most [`THREADS_OF_A_KIND`] threads of one gateway work on each kind of work. Further work waits in order.
 
 use std::sync::Arc;
 
@@ -20,17 +20,17 @@ use crate::protocol::limits::MEDIUM;
 /// and a light call waits for all of it.
 pub const SHORT_WORK: usize = 16 * 1024;
 /// Most active threads for each kind of work.
-pub const PLACES: usize = 2;
+pub const THREADS_OF_A_KIND: usize = 2;
 const KINDS: usize = 3;
-/// One thread for each place, so that no kind of work waits for another.
-pub const THREADS: usize = KINDS * PLACES;
+/// All threads, so that no kind of work waits for another.
+pub const THREADS: usize = KINDS * THREADS_OF_A_KIND;
 
-/// The kinds of work. Each has its own places.
+/// The kinds of work. Each has its own threads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WorkKind {
     /// Reads a frame or encodes a message.
     Usual,
-    /// The same for more than [`MEDIUM`] bytes. Shorter work has places of its own.
+    /// The same for more than [`MEDIUM`] bytes. Shorter work has threads of its own.
     Long,
     /// Writes a long list.
     Listing,
@@ -49,14 +49,14 @@ impl WorkKind {
 }
 
 thread_local! {
-    static FREE: [Arc<Semaphore>; KINDS] = std::array::from_fn(|_| Arc::new(Semaphore::new(PLACES)));
+    static FREE: [Arc<Semaphore>; KINDS] = std::array::from_fn(|_| Arc::new(Semaphore::new(THREADS_OF_A_KIND)));
 }
 
-/// A place for one kind of work.
+/// The right to a thread for one kind of work.
 pub struct WorkPermit(OwnedSemaphorePermit);
 
 impl WorkPermit {
-    /// Waits for a free place, for work that uses no memory while it waits. `None` if the runtime is ending.
+    /// Waits for a free thread, for work that uses no memory while it waits. `None` if the runtime is ending.
     pub async fn take(kind: WorkKind) -> Option<Self> {
         let free = FREE.with(|free| free.get(kind as usize).map(Arc::clone))?;
         free.acquire_owned().await.ok().map(Self)
@@ -64,14 +64,14 @@ impl WorkPermit {
 
     /// Runs `work` on another thread, or one turn later on the same thread in a simulation, which has only one. `None`
     /// after a panic, which is logged, or if the runtime is ending.
-    pub async fn perform<T: Send + 'static>(
+    pub async fn run<T: Send + 'static>(
         self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Option<T> {
-        let Self(place) = self;
+        let Self(permit) = self;
         let work = move || {
             let done = contain(work);
-            drop(place);
+            drop(permit);
             done
         };
         let done = if work_clock::is_counted() {
@@ -90,10 +90,10 @@ impl WorkPermit {
     }
 }
 
-/// Waits for a place and runs `work` there.
+/// Waits for a free thread and runs `work` there.
 pub async fn run_long_work<T: Send + 'static>(
     kind: WorkKind,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Option<T> {
-    WorkPermit::take(kind).await?.perform(work).await
+    WorkPermit::take(kind).await?.run(work).await
 }

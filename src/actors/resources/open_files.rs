@@ -13,7 +13,7 @@ const REFUSED_AT_ONCE: usize = 480;
 
 /// How many connections there can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Room {
+pub struct Capacity {
     /// Clients that are served.
     pub clients: usize,
     /// Connections without a token yet, or without a free place. They are counted separately.
@@ -23,15 +23,15 @@ pub struct Room {
 /// Raises the limit of open files as far as the `wanted` connections need and the system allows. Returns the number of
 /// possible connections, and logs a warning if the limit reduces the clients.
 #[must_use]
-pub fn make_room(wanted: Room, asks_token: bool) -> Room {
+pub fn make_capacity(wanted: Capacity, asks_token: bool) -> Capacity {
     let needed = wanted.clients + wanted.newcomers + OTHER_FILES + REFUSED_AT_ONCE;
     // The limit is never lowered.
     let files = raise_limit(needed).unwrap_or_else(|error| {
         tracing::warn!(%error, "the limit of open files is unknown");
         usize::MAX
     });
-    let room = room_with(files, wanted, asks_token);
-    let clients = room.clients;
+    let capacity = capacity_with(files, wanted, asks_token);
+    let clients = capacity.clients;
     if clients < wanted.clients {
         tracing::warn!(
             files,
@@ -39,7 +39,7 @@ pub fn make_room(wanted: Room, asks_token: bool) -> Room {
             "the limit of open files is low, so fewer clients are served"
         );
     }
-    room
+    capacity
 }
 
 /// Raises the limit to `needed` or the largest allowed value. Returns the new limit.
@@ -57,7 +57,7 @@ fn raise_limit(_: usize) -> std::io::Result<usize> {
 
 /// Returns the places that `files` open files allow, for at least one client. If a token is required and files are few,
 /// newcomers get half of the files.
-fn room_with(files: usize, wanted: Room, asks_token: bool) -> Room {
+fn capacity_with(files: usize, wanted: Capacity, asks_token: bool) -> Capacity {
     let files = files.saturating_sub(OTHER_FILES);
     let newcomers = if asks_token {
         (files / 2).clamp(1, wanted.newcomers.max(1))
@@ -65,7 +65,7 @@ fn room_with(files: usize, wanted: Room, asks_token: bool) -> Room {
         wanted.newcomers
     };
     let kept_for_them = if asks_token { newcomers } else { 0 };
-    Room {
+    Capacity {
         clients: files
             .saturating_sub(kept_for_them)
             .clamp(1, wanted.clients.max(1)),
@@ -83,7 +83,7 @@ mod tests {
         /// More than the usual limit of 1,024 files allows.
         const WANTED: usize = 2000;
         const USUAL: usize = 1024 - OTHER_FILES;
-        let wanted = Room {
+        let wanted = Capacity {
             clients: WANTED,
             newcomers: MAX_NEWCOMERS,
         };
@@ -98,8 +98,8 @@ mod tests {
             (64, true, 16, 16),
             (3, true, 1, 1),
         ] {
-            let room = Room { clients, newcomers };
-            assert_eq!(room_with(files, wanted, asks_token), room);
+            let capacity = Capacity { clients, newcomers };
+            assert_eq!(capacity_with(files, wanted, asks_token), capacity);
         }
     }
 }

@@ -103,7 +103,7 @@ mod sockets {
     }
 
     /// A number in the description of the socket at `of`, which is connected to `to`.
-    pub(super) fn value(of: SocketAddr, to: SocketAddr, place: usize) -> Option<u32> {
+    pub(super) fn value(of: SocketAddr, to: SocketAddr, offset: usize) -> Option<u32> {
         DIAGNOSTICS.with(|socket| {
             let socket = socket.as_ref()?;
             send(socket, &request(of, to), SendFlags::empty()).ok()?;
@@ -117,8 +117,8 @@ mod sockets {
             };
             let kind = answer.get(4..6)?;
             let bytes = answer
-                .get(place..place + 4)
-                .filter(|_| length >= place + 4)?;
+                .get(offset..offset + 4)
+                .filter(|_| length >= offset + 4)?;
             // Any other kind is an error: there is no such socket on this machine.
             (kind == BY_FAMILY.to_ne_bytes())
                 .then(|| u32::from_ne_bytes(bytes.try_into().unwrap_or_default()))

@@ -8,7 +8,7 @@ use bytes::Bytes;
 use serde_json::Value;
 
 use crate::actors::node::TakeCensus;
-use crate::actors::node::{Address, Answered, Ask, Call, Callable, Nodes};
+use crate::actors::node::{Address, Ask, Call, Nodes};
 use crate::actors::resources::long_work::{WorkKind, WorkPermit};
 use crate::actors::resources::memory::SHORT;
 use crate::protocol::catalog::{Rosapi, Service};
@@ -54,10 +54,6 @@ pub struct AskRosapi {
     pub name: String,
 }
 
-impl Ask for AskRosapi {
-    type Answer = Result<Value, UnknownType>;
-}
-
 // ---- life cycle -----------------------------------------------------------------------------------------------------
 
 impl Actor for RosapiNode {
@@ -77,17 +73,17 @@ impl Handler<Call<AskRosapi>> for RosapiNode {
             if !reply.reserve(reserved).await {
                 return;
             }
-            // A call that waits for memory holds neither a place nor a census, so at most as many as there are places
+            // A call that waits for memory holds neither a thread nor a census, so at most as many as there are threads
             // exist. Names may be added during the wait.
-            while let Some(place) = WorkPermit::take(WorkKind::Listing).await {
+            while let Some(permit) = WorkPermit::take(WorkKind::Listing).await {
                 let census = registry.send(TakeCensus).await.unwrap_or_default();
                 let needed = census.most_bytes();
                 if needed <= reserved {
                     let list = move || reply.answer(answer(ask.question, &ask.name, &census));
-                    place.perform(list).await;
+                    permit.run(list).await;
                     return;
                 }
-                drop((place, census));
+                drop((permit, census));
                 reserved = needed + needed / 8;
                 if !reply.reserve(reserved).await {
                     return;
@@ -100,7 +96,9 @@ impl Handler<Call<AskRosapi>> for RosapiNode {
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
 
-impl Callable for AskRosapi {
+impl Ask for AskRosapi {
+    type Answer = Result<Value, UnknownType>;
+
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let name = service.fields().first();
@@ -115,9 +113,7 @@ impl Callable for AskRosapi {
         };
         fields.accept(Self { question, name })
     }
-}
 
-impl Answered for AskRosapi {
     fn write(answer: Result<Value, UnknownType>, to: &Address) -> Bytes {
         to.outcome(answer)
     }

@@ -120,7 +120,7 @@ pub fn action_goal(
     args: &Payload,
     feedback: bool,
 ) -> Bytes {
-    Encoder::with_room("send_action_goal", args)
+    Encoder::with_payload("send_action_goal", args)
         .value("action", action)
         .value("id", id)
         .optional("action_type", type_name)
@@ -151,7 +151,7 @@ pub fn status(level: Level, msg: &str, id: Option<&Payload>) -> Bytes {
 /// A call for a provider that is a client, under an id of the runtime. `args` are forwarded.
 #[must_use]
 pub fn call(service: &str, id: &str, args: &Payload) -> Bytes {
-    Encoder::with_room("call_service", args)
+    Encoder::with_payload("call_service", args)
         .value("service", service)
         .value("id", id)
         .value("args", args)

@@ -28,7 +28,7 @@ const USUAL_FRAME: usize = 512;
 /// A forwarded message of a client; `msg` is valid JSON.
 #[must_use]
 pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
-    Encoder::with_room("publish", msg)
+    Encoder::with_payload("publish", msg)
         .value("topic", topic)
         .value("msg", msg)
         .end()
@@ -63,8 +63,8 @@ impl Encoder {
         Self::after(Vec::with_capacity(USUAL_FRAME), op)
     }
 
-    /// A frame that also has room for the payload, so it is not copied.
-    fn with_room(op: &str, payload: &Payload) -> Self {
+    /// A frame that also has capacity for the payload, so it is not copied.
+    fn with_payload(op: &str, payload: &Payload) -> Self {
         let bytes = USUAL_FRAME + payload.line().len();
         Self::after(Vec::with_capacity(bytes), op)
     }

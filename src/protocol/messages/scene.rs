@@ -156,18 +156,18 @@ pub fn fixed_frames(stamp: Stamp, lengths: &[f64]) -> TfMessage {
 }
 
 /// Every frame of an arm with these lengths \[m\] at these joint positions \[rad\], with its pose in the world.
-fn places(lengths: &[f64], positions: &[f64]) -> Vec<(String, FramePose)> {
+fn poses(lengths: &[f64], positions: &[f64]) -> Vec<(String, FramePose)> {
     let mut at = FramePose::default();
-    let mut places = vec![(WORLD.to_owned(), at)];
+    let mut poses = vec![(WORLD.to_owned(), at)];
     for (index, (length, position)) in lengths.iter().zip(positions).enumerate() {
         at.angle += position;
-        places.push((link_name(index), at));
+        poses.push((link_name(index), at));
         let (sin, cos) = at.angle.sin_cos();
         at.x += length * cos;
         at.y += length * sin;
     }
-    places.push((END_EFFECTOR.to_owned(), at));
-    places
+    poses.push((END_EFFECTOR.to_owned(), at));
+    poses
 }
 
 /// Whether an arm of `links` links has a frame of that name.
@@ -190,11 +190,11 @@ pub fn seen_from<'a>(
     lengths: &[f64],
     positions: &[f64],
 ) -> TfMessage {
-    let places = places(lengths, positions);
+    let poses = poses(lengths, positions);
     let find = |name: &str| {
-        let mut places = places.iter();
-        let found = places.find(|(one, _)| one == without_slash(name));
-        found.map(|(_, place)| *place)
+        let mut poses = poses.iter();
+        let found = poses.find(|(one, _)| one == without_slash(name));
+        found.map(|(_, pose)| *pose)
     };
     let transforms = sources.filter_map(|source| {
         let pose = find(source)?.seen_from(find(target)?);

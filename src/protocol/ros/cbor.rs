@@ -75,8 +75,8 @@ pub fn publish_raw(topic: &str, type_name: &str, msg: &RawValue, most: usize) ->
 
 /// The time in the message's header; 0 if it has none.
 fn stamp(msg: &RawValue) -> (u64, u64) {
-    let places = ["header", "stamp", "clock", "transforms"];
-    let [header, stamp, clock, transforms] = json::members(msg.get(), &places).unwrap_or_default();
+    let names = ["header", "stamp", "clock", "transforms"];
+    let [header, stamp, clock, transforms] = json::members(msg.get(), &names).unwrap_or_default();
     let first = transforms.and_then(|all| json::entries(all, 1)?.first.pop());
     let found = member(header, "stamp").or(stamp).or(clock);
     let found = found.or_else(|| member(member(first, "header"), "stamp"));

@@ -25,7 +25,7 @@ impl Sink {
     }
 
     pub(super) fn extend(&mut self, bytes: &[u8]) {
-        if self.has_room(bytes.len()) {
+        if self.has_space(bytes.len()) {
             self.bytes.extend_from_slice(bytes);
         }
     }
@@ -34,7 +34,7 @@ impl Sink {
     pub(super) fn align(&mut self, start: usize, size: usize) {
         let written = self.bytes.len().saturating_sub(start);
         let zeros = written.next_multiple_of(size) - written;
-        if self.has_room(zeros) {
+        if self.has_space(zeros) {
             self.bytes.resize(self.bytes.len() + zeros, 0);
         }
     }
@@ -56,7 +56,7 @@ impl Sink {
         (!self.is_over).then_some(self.bytes)
     }
 
-    fn has_room(&mut self, more: usize) -> bool {
+    fn has_space(&mut self, more: usize) -> bool {
         if more > self.most - self.bytes.len() {
             self.fail();
         }

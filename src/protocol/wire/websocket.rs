@@ -384,9 +384,9 @@ impl MessageWriter {
         for message in messages {
             let mut rest = message.as_ref();
             while !rest.is_empty() {
-                let room = FRAGMENT.saturating_sub(self.unsent);
+                let most = FRAGMENT.saturating_sub(self.unsent);
                 let kind = self.unfinished.unwrap_or_else(|| kind_of(rest));
-                let (piece, taken, is_last) = first_piece(rest, kind == opcode::TEXT, room);
+                let (piece, taken, is_last) = first_piece(rest, kind == opcode::TEXT, most);
                 if self.unsent > 0 && !is_last {
                     return;
                 }
@@ -479,8 +479,8 @@ fn kind_of(message: &[u8]) -> u8 {
 
 /// The part of `bytes` that fits into one frame, the number of `bytes` that it takes, and whether a message ends there.
 /// A text may be several messages, one per line. The end of a line is not sent.
-fn first_piece(bytes: &[u8], is_text: bool, room: usize) -> (&[u8], usize, bool) {
-    let offered = bytes.get(..room).unwrap_or(bytes);
+fn first_piece(bytes: &[u8], is_text: bool, most: usize) -> (&[u8], usize, bool) {
+    let offered = bytes.get(..most).unwrap_or(bytes);
     let end = || offered.iter().position(|&byte| byte == b'\n');
     let line = is_text
         .then(end)

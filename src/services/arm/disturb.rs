@@ -5,7 +5,7 @@
 use bytes::Bytes;
 
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::{Address, Answered, Ask, FieldByField};
+use crate::services::Address;
 
 /// The reason for a refusal after a divergence.
 pub(crate) const DIVERGED: &str =
@@ -20,6 +20,15 @@ request! {
         /// Simulation time \[s\], greater than 0.
         duration: Option<f64> = fields.number("duration", Bound::Positive),
     }
+
+    fn write(answer: Result<Push<N>, Rejections>, to: &Address) -> Bytes {
+        to.outcome(answer.as_ref().map(|push| {
+            object! {
+                effort: push.effort.as_slice(),
+                duration: push.duration,
+            }
+        }))
+    }
 }
 
 /// A disturbance that has begun.
@@ -29,15 +38,4 @@ pub struct Push<const N: usize> {
     pub effort: [f64; N],
     /// Simulation time \[s\].
     pub duration: f64,
-}
-
-impl<const N: usize> Answered for Disturb<N> {
-    fn write(answer: Result<Push<N>, Rejections>, to: &Address) -> Bytes {
-        to.outcome(answer.as_ref().map(|push| {
-            object! {
-                effort: push.effort.as_slice(),
-                duration: push.duration,
-            }
-        }))
-    }
 }

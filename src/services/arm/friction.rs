@@ -5,7 +5,7 @@
 use bytes::Bytes;
 
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::{Address, Answered, Ask, Echo, FieldByField};
+use crate::services::{Address, Echo};
 
 request! {
     /// Sets the friction of each joint.
@@ -13,9 +13,7 @@ request! {
         /// \[N m s/rad\], at least 0.
         viscous: Option<[f64; N]> = fields.array("viscous", Bound::NonNegative),
     }
-}
 
-impl<const N: usize> Answered for SetFriction<N> {
     fn write(Echo { values, rejected }: Echo<[f64; N]>, to: &Address) -> Bytes {
         let values = object! {
             viscous: values.as_slice(),

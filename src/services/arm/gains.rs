@@ -6,7 +6,7 @@ use bytes::Bytes;
 
 use crate::math::pid::Gains;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::{Address, Answered, Ask, Echo, FieldByField};
+use crate::services::{Address, Echo};
 
 request! {
     /// Sets the controller's gains, each at least 0.
@@ -17,6 +17,15 @@ request! {
         ki: Option<[f64; N]> = fields.array("ki", Bound::NonNegative),
         /// \[N m s/rad\].
         kd: Option<[f64; N]> = fields.array("kd", Bound::NonNegative),
+    }
+
+    fn write(Echo { values, rejected }: Echo<Gains<N>>, to: &Address) -> Bytes {
+        let values = object! {
+            kp: values.kp.as_slice(),
+            ki: values.ki.as_slice(),
+            kd: values.kd.as_slice(),
+        };
+        to.response(&values, &rejected.status())
     }
 }
 
@@ -29,16 +38,5 @@ impl<const N: usize> SetGains<N> {
             ki: self.ki.unwrap_or(gains.ki),
             kd: self.kd.unwrap_or(gains.kd),
         }
-    }
-}
-
-impl<const N: usize> Answered for SetGains<N> {
-    fn write(Echo { values, rejected }: Echo<Gains<N>>, to: &Address) -> Bytes {
-        let values = object! {
-            kp: values.kp.as_slice(),
-            ki: values.ki.as_slice(),
-            kd: values.kd.as_slice(),
-        };
-        to.response(&values, &rejected.status())
     }
 }

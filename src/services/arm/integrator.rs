@@ -6,7 +6,7 @@ use bytes::Bytes;
 
 use crate::math::integrator::Method;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::{Address, Answered, Ask, Echo, FieldByField};
+use crate::services::{Address, Echo};
 
 request! {
     /// Sets method and timestep.
@@ -15,6 +15,14 @@ request! {
         method: Option<Method> = fields.choice("method", &Method::ALL, Method::name),
         /// Length of a step \[s\], greater than 0.
         timestep: Option<f64> = fields.number("timestep", Bound::Positive),
+    }
+
+    fn write(Echo { values, rejected }: Echo<Integrator>, to: &Address) -> Bytes {
+        let values = object! {
+            method: values.method.name(),
+            timestep: values.timestep,
+        };
+        to.response(&values, &rejected.status())
     }
 }
 
@@ -25,14 +33,4 @@ pub struct Integrator {
     pub method: Method,
     /// Length of a step \[s\].
     pub timestep: f64,
-}
-
-impl Answered for SetIntegrator {
-    fn write(Echo { values, rejected }: Echo<Integrator>, to: &Address) -> Bytes {
-        let values = object! {
-            method: values.method.name(),
-            timestep: values.timestep,
-        };
-        to.response(&values, &rejected.status())
-    }
 }

@@ -6,7 +6,7 @@ use bytes::Bytes;
 
 use crate::math::limits::{AntiWindup, Limits};
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::{Address, Answered, Ask, Echo, FieldByField};
+use crate::services::{Address, Echo};
 
 request! {
     /// Sets the largest efforts that the motors apply, and what the integral does meanwhile.
@@ -19,6 +19,15 @@ request! {
         /// The tracking time of the back calculation \[s\], greater than 0.
         tracking_time: Option<f64> = fields.number("tracking_time", Bound::Positive),
     }
+
+    fn write(Echo { values, rejected }: Echo<Limits<N>>, to: &Address) -> Bytes {
+        let values = object! {
+            effort: values.effort.as_ref().map(<[f64; N]>::as_slice),
+            anti_windup: values.anti_windup.name(),
+            tracking_time: values.tracking_time,
+        };
+        to.response(&values, &rejected.status())
+    }
 }
 
 impl<const N: usize> SetLimits<N> {
@@ -30,16 +39,5 @@ impl<const N: usize> SetLimits<N> {
             anti_windup: self.anti_windup.unwrap_or(limits.anti_windup),
             tracking_time: self.tracking_time.unwrap_or(limits.tracking_time),
         }
-    }
-}
-
-impl<const N: usize> Answered for SetLimits<N> {
-    fn write(Echo { values, rejected }: Echo<Limits<N>>, to: &Address) -> Bytes {
-        let values = object! {
-            effort: values.effort.as_ref().map(<[f64; N]>::as_slice),
-            anti_windup: values.anti_windup.name(),
-            tracking_time: values.tracking_time,
-        };
-        to.response(&values, &rejected.status())
     }
 }

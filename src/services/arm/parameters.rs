@@ -14,7 +14,7 @@ use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, RejectedField, Rejections};
 use crate::protocol::ros::parameters::{MAX_NAMED, NO_SUCH, Parameter, ParameterType};
 use crate::protocol::wire::json::{self, text};
-use crate::services::{Address, Answered, Ask, Callable, FieldByField};
+use crate::services::{Address, Ask};
 
 /// The services of ROS 2.
 const OF_ROS_2: [Service; 5] = [
@@ -39,11 +39,6 @@ pub fn parameter_services() -> impl Iterator<Item = Service> {
 pub struct AskParameters<const N: usize> {
     /// The named parameters, and the request about each.
     pub entries: Vec<(NamedParameter, ParameterRequest<N>)>,
-}
-
-impl<const N: usize> Ask for AskParameters<N> {
-    /// The requested values.
-    type Answer = Vec<(NamedParameter, Result<Option<ParameterValue<N>>, NotSet>)>;
 }
 
 /// A parameter by its name.
@@ -157,7 +152,10 @@ impl NamedParameter {
     }
 }
 
-impl<const N: usize> Callable for AskParameters<N> {
+impl<const N: usize> Ask for AskParameters<N> {
+    /// The requested values.
+    type Answer = Vec<(NamedParameter, Result<Option<ParameterValue<N>>, NotSet>)>;
+
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let entries = match service {
@@ -183,6 +181,47 @@ impl<const N: usize> Callable for AskParameters<N> {
             }
         };
         fields.accept(Self { entries })
+    }
+
+    fn write(answers: Self::Answer, to: &Address) -> Bytes {
+        let as_json = |answer: Result<Option<ParameterValue<N>>, NotSet>| {
+            answer.map(|value| value.map(Value::from))
+        };
+        let values = match to.service() {
+            Service::Rosapi(Rosapi::GetParamNames) => {
+                let all = answers.iter().filter_map(|(named, _)| named.parameter);
+                json!({"names": all.map(Parameter::full_name).collect::<Vec<_>>()})
+            }
+            Service::Rosapi(question) => match answers.into_iter().next() {
+                Some((named, answer)) => rosapi_values(question, &named, as_json(answer)),
+                None => Value::Null,
+            },
+            Service::ListParameters => {
+                let names: Vec<_> = answers.iter().map(|(named, _)| &named.name).collect();
+                json!({"result": {"names": names, "prefixes": []}})
+            }
+            Service::GetParameters => {
+                let values = answers.into_iter();
+                let values = values
+                    .map(|(named, answer)| value_message(&named, as_json(answer).ok().flatten()));
+                json!({"values": values.collect::<Vec<_>>()})
+            }
+            Service::GetParameterTypes => {
+                let types = answers
+                    .iter()
+                    .map(|(named, _)| type_number(named.parameter));
+                json!({"types": types.collect::<Vec<_>>()})
+            }
+            Service::SetParameters => {
+                let results = answers.iter().map(|(_, answer)| change_values(answer));
+                json!({"results": results.collect::<Vec<_>>()})
+            }
+            _ => {
+                let descriptors = answers.iter().map(|(named, _)| descriptor(named));
+                json!({"descriptors": descriptors.collect::<Vec<_>>()})
+            }
+        };
+        to.response(&values, "")
     }
 }
 
@@ -315,49 +354,6 @@ fn read_given<const N: usize>(entry: &RawValue) -> Option<(NamedParameter, Param
 }
 
 // ---- writing --------------------------------------------------------------------------------------------------------
-
-impl<const N: usize> Answered for AskParameters<N> {
-    fn write(answers: Self::Answer, to: &Address) -> Bytes {
-        let as_json = |answer: Result<Option<ParameterValue<N>>, NotSet>| {
-            answer.map(|value| value.map(Value::from))
-        };
-        let values = match to.service() {
-            Service::Rosapi(Rosapi::GetParamNames) => {
-                let all = answers.iter().filter_map(|(named, _)| named.parameter);
-                json!({"names": all.map(Parameter::full_name).collect::<Vec<_>>()})
-            }
-            Service::Rosapi(question) => match answers.into_iter().next() {
-                Some((named, answer)) => rosapi_values(question, &named, as_json(answer)),
-                None => Value::Null,
-            },
-            Service::ListParameters => {
-                let names: Vec<_> = answers.iter().map(|(named, _)| &named.name).collect();
-                json!({"result": {"names": names, "prefixes": []}})
-            }
-            Service::GetParameters => {
-                let values = answers.into_iter();
-                let values = values
-                    .map(|(named, answer)| value_message(&named, as_json(answer).ok().flatten()));
-                json!({"values": values.collect::<Vec<_>>()})
-            }
-            Service::GetParameterTypes => {
-                let types = answers
-                    .iter()
-                    .map(|(named, _)| type_number(named.parameter));
-                json!({"types": types.collect::<Vec<_>>()})
-            }
-            Service::SetParameters => {
-                let results = answers.iter().map(|(_, answer)| change_values(answer));
-                json!({"results": results.collect::<Vec<_>>()})
-            }
-            _ => {
-                let descriptors = answers.iter().map(|(named, _)| descriptor(named));
-                json!({"descriptors": descriptors.collect::<Vec<_>>()})
-            }
-        };
-        to.response(&values, "")
-    }
-}
 
 /// The values of an answer of rosapi about one parameter.
 fn rosapi_values(

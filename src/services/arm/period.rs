@@ -10,7 +10,7 @@ use bytes::Bytes;
 
 use crate::math::simulation::ControlPeriod;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::{Address, Answered, Ask, Echo, FieldByField};
+use crate::services::{Address, Echo};
 
 request! {
     /// Sets the time between two runs of the control law.
@@ -19,6 +19,15 @@ request! {
         period: Option<f64> = fields.number("period", Bound::NonNegative),
         /// Whether an effort is applied one period after its state was read, or none.
         delay: Option<bool> = fields.boolean("delay"),
+    }
+
+    fn write(Echo { values, rejected }: Echo<PeriodInForce>, to: &Address) -> Bytes {
+        let values = object! {
+            period: values.period.period,
+            effective_period: values.effective,
+            delay: values.period.delay > 0,
+        };
+        to.response(&values, &rejected.status())
     }
 }
 
@@ -29,15 +38,4 @@ pub struct PeriodInForce {
     pub period: ControlPeriod,
     /// The effective period, a whole number of timesteps \[s\].
     pub effective: f64,
-}
-
-impl Answered for SetPeriod {
-    fn write(Echo { values, rejected }: Echo<PeriodInForce>, to: &Address) -> Bytes {
-        let values = object! {
-            period: values.period.period,
-            effective_period: values.effective,
-            delay: values.period.delay > 0,
-        };
-        to.response(&values, &rejected.status())
-    }
 }

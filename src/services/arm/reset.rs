@@ -6,15 +6,13 @@ use bytes::Bytes;
 
 use crate::math::arm::State;
 use crate::protocol::op::fields::{Fields, Rejections};
-use crate::services::{Address, Answered, Ask, Echo, FieldByField};
+use crate::services::{Address, Echo};
 
 request! {
     /// Returns the arm to its starting pose at time 0, unless the request was rejected. It has no fields, so it is
     /// rejected as a whole.
     pub struct Reset<N> -> Echo<State<N>>, |fields| {}
-}
 
-impl<const N: usize> Answered for Reset<N> {
     fn write(echo: Echo<State<N>>, to: &Address) -> Bytes {
         write_state(&echo, to)
     }

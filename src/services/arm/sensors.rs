@@ -6,7 +6,7 @@ use bytes::Bytes;
 
 use crate::math::sensors::{MAX_DELAY, Sensors, VelocitySource};
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::{Address, Answered, Ask, Echo, FieldByField};
+use crate::services::{Address, Echo};
 
 request! {
     /// Sets the sensors of the controller.
@@ -20,6 +20,15 @@ request! {
         delay: Option<u8> = fields
             .count("delay", 0..=u64::from(MAX_DELAY))
             .and_then(|delay| u8::try_from(delay).ok()),
+    }
+
+    fn write(Echo { values, rejected }: Echo<SensorsInForce<N>>, to: &Address) -> Bytes {
+        let values = object! {
+            encoder_step: values.sensors.encoder_step.as_slice(),
+            velocity: values.sensors.velocity.name(),
+            delay: values.delay,
+        };
+        to.response(&values, &rejected.status())
     }
 }
 
@@ -44,16 +53,5 @@ impl<const N: usize> SetSensors<N> {
             },
             delay: self.delay.unwrap_or(delay),
         }
-    }
-}
-
-impl<const N: usize> Answered for SetSensors<N> {
-    fn write(Echo { values, rejected }: Echo<SensorsInForce<N>>, to: &Address) -> Bytes {
-        let values = object! {
-            encoder_step: values.sensors.encoder_step.as_slice(),
-            velocity: values.sensors.velocity.name(),
-            delay: values.delay,
-        };
-        to.response(&values, &rejected.status())
     }
 }

@@ -6,7 +6,7 @@ use bytes::Bytes;
 
 use crate::math::arm::{Arm, ArmError};
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::{Address, Answered, Ask, Echo, FieldByField};
+use crate::services::{Address, Echo};
 
 request! {
     /// Sets the arm's parameters.
@@ -17,6 +17,15 @@ request! {
         masses: Option<[f64; N]> = fields.array("masses", Bound::Positive),
         /// \[m\], greater than 0.
         lengths: Option<[f64; N]> = fields.array("lengths", Bound::Positive),
+    }
+
+    fn write(Echo { values, rejected }: Echo<Arm<N>>, to: &Address) -> Bytes {
+        let values = object! {
+            gravity: values.gravity(),
+            masses: values.masses().as_slice(),
+            lengths: values.lengths().as_slice(),
+        };
+        to.response(&values, &rejected.status())
     }
 }
 
@@ -32,16 +41,5 @@ impl<const N: usize> SetParams<N> {
             self.gravity.unwrap_or(arm.gravity()),
         )?
         .with_friction(*arm.viscous())
-    }
-}
-
-impl<const N: usize> Answered for SetParams<N> {
-    fn write(Echo { values, rejected }: Echo<Arm<N>>, to: &Address) -> Bytes {
-        let values = object! {
-            gravity: values.gravity(),
-            masses: values.masses().as_slice(),
-            lengths: values.lengths().as_slice(),
-        };
-        to.response(&values, &rejected.status())
     }
 }

@@ -7,7 +7,7 @@ use bytes::Bytes;
 use super::reset::write_state;
 use crate::math::arm::State;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::{Address, Answered, Ask, Echo, FieldByField};
+use crate::services::{Address, Echo};
 
 request! {
     /// Sets positions and velocities, running or paused, and ends a divergence.
@@ -17,9 +17,7 @@ request! {
         /// Joint velocities \[rad/s\].
         velocity: Option<[f64; N]> = fields.array("velocity", Bound::Finite),
     }
-}
 
-impl<const N: usize> Answered for SetState<N> {
     fn write(echo: Echo<State<N>>, to: &Address) -> Bytes {
         write_state(&echo, to)
     }

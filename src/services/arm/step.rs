@@ -11,7 +11,7 @@ use bytes::Bytes;
 use crate::math::arm::State;
 use crate::protocol::messages::Empty;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::{Address, Answered, Ask, FieldByField};
+use crate::services::Address;
 
 /// Most steps in one request: the budget of one wake-up, and ten seconds at the default timestep.
 pub const MAX_STEPS: u64 = 10_000;
@@ -26,6 +26,27 @@ request! {
         steps: Option<u64> = fields.count("steps", 1..=MAX_STEPS),
         /// The effort in these steps \[N m\], in place of the controller's; `None` for the controller's.
         effort: Option<[f64; N]> = fields.array("effort", Bound::Finite),
+    }
+
+    fn write(answer: Result<Stepped<N>, Rejections>, to: &Address) -> Bytes {
+        match answer {
+            Ok(stepped) => {
+                let status = match stepped.end {
+                    StepsEnd::AllTaken => "",
+                    StepsEnd::Diverged => "steps ended early: the simulation has diverged",
+                    StepsEnd::Resumed => "steps ended early: the arm has been resumed",
+                };
+                let values = object! {
+                    steps: stepped.steps,
+                    time: stepped.time,
+                    position: stepped.state.position.as_slice(),
+                    velocity: stepped.state.velocity.as_slice(),
+                    effort: stepped.effort.as_slice(),
+                };
+                to.response(&values, status)
+            }
+            Err(rejected) => to.response(&Empty {}, &rejected.status()),
+        }
     }
 }
 
@@ -53,27 +74,4 @@ pub enum StepsEnd {
     Diverged,
     /// The arm has been resumed.
     Resumed,
-}
-
-impl<const N: usize> Answered for Step<N> {
-    fn write(answer: Result<Stepped<N>, Rejections>, to: &Address) -> Bytes {
-        match answer {
-            Ok(stepped) => {
-                let status = match stepped.end {
-                    StepsEnd::AllTaken => "",
-                    StepsEnd::Diverged => "steps ended early: the simulation has diverged",
-                    StepsEnd::Resumed => "steps ended early: the arm has been resumed",
-                };
-                let values = object! {
-                    steps: stepped.steps,
-                    time: stepped.time,
-                    position: stepped.state.position.as_slice(),
-                    velocity: stepped.state.velocity.as_slice(),
-                    effort: stepped.effort.as_slice(),
-                };
-                to.response(&values, status)
-            }
-            Err(rejected) => to.response(&Empty {}, &rejected.status()),
-        }
-    }
 }

@@ -6,7 +6,7 @@
 use bytes::Bytes;
 
 use crate::protocol::op::fields::{Fields, Rejections};
-use crate::services::{Address, Answered, Ask, Echo, FieldByField};
+use crate::services::{Address, Echo};
 
 fn write_switch(echo: &Echo<bool>, to: &Address) -> Bytes {
     to.response(&object! { data: echo.values }, &echo.rejected.status())
@@ -18,9 +18,7 @@ request! {
         /// True to freeze it.
         paused: Option<bool> = fields.boolean("data"),
     }
-}
 
-impl Answered for Pause {
     fn write(echo: Echo<bool>, to: &Address) -> Bytes {
         write_switch(&echo, to)
     }
@@ -32,9 +30,7 @@ request! {
         /// True to switch it on.
         enabled: Option<bool> = fields.boolean("data"),
     }
-}
 
-impl Answered for Enable {
     fn write(echo: Echo<bool>, to: &Address) -> Bytes {
         write_switch(&echo, to)
     }

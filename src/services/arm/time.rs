@@ -9,7 +9,7 @@ use crate::protocol::catalog::Service;
 use crate::protocol::messages::Stamp;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
-use crate::services::{Address, Answered, Ask, Callable};
+use crate::services::{Address, Ask};
 
 /// Asks for the simulation time \[s\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,16 +17,12 @@ pub struct GetTime;
 
 impl Ask for GetTime {
     type Answer = f64;
-}
 
-impl Callable for GetTime {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         Fields::read(arguments, service)?;
         Ok(Self)
     }
-}
 
-impl Answered for GetTime {
     fn write(time: f64, to: &Address) -> Bytes {
         let Stamp { sec, nanosec } = Stamp::from_seconds(time);
         // ROS 1 has other names for the same; some clients know only those.

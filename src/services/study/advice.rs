@@ -13,9 +13,8 @@ use crate::math::pid::{Gains, Setpoint};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::FieldByField as _;
 use crate::services::arm::{SetGains, SetParams};
-use crate::services::{Address, Answered, Ask, Callable};
+use crate::services::{Address, Ask};
 use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::gains::{GainsError, GainsRequirements, SuggestedGains, search_gains};
 use crate::study::planner::{PlanError, Planned, Task, plan, plan_beside};
@@ -37,10 +36,6 @@ pub struct SuggestGains<const N: usize> {
     pub params: Option<SetParams<N>>,
     /// Friction, limits, sensors and delay.
     pub robot: RobotSettings<N>,
-}
-
-impl<const N: usize> Ask for SuggestGains<N> {
-    type Answer = Result<Suggested<N>, Refused<GainsError>>;
 }
 
 /// Simulated gains.
@@ -79,54 +74,7 @@ request! {
         /// Friction, limits, sensors and delay.
         robot: RobotSettings<N> = RobotSettings::read(&mut fields),
     }
-}
 
-/// A simulated plan.
-#[derive(Debug, Clone)]
-pub struct PlannedRun {
-    /// The cheapest run, and all simulated runs within the error.
-    pub planned: Planned,
-    /// The control period \[s\], if a controller holds the arm: the timestep, unless another was requested.
-    pub control_period: Option<f64>,
-}
-
-// ---- reading and writing --------------------------------------------------------------------------------------------
-
-impl<const N: usize> Callable for SuggestGains<N> {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read(arguments, service)?;
-        let ask = Self {
-            settling_time: fields.number("settling_time", Bound::Positive),
-            margin: fields.number("margin", Bound::Finite),
-            timestep: fields.number("timestep", Bound::Positive),
-            method: fields.choice("integrator", &Method::ALL, Method::name),
-            params: fields.object("params", SetParams::from_fields),
-            robot: RobotSettings::read(&mut fields),
-        };
-        if let Some(margin) = ask.margin.filter(|margin| *margin < 1.0) {
-            fields.refuse("margin", &format_args!("must be at least 1, got {margin}"));
-        }
-        fields.accept(ask)
-    }
-}
-
-impl<const N: usize> Answered for SuggestGains<N> {
-    fn write(answer: Self::Answer, to: &Address) -> Bytes {
-        to.outcome(answer.as_ref().map(|Suggested { found, timestep }| {
-            object! {
-                kp: found.gains.kp.as_slice(),
-                ki: found.gains.ki.as_slice(),
-                kd: found.gains.kd.as_slice(),
-                timestep_limit: found.limit,
-                certified: found.certified,
-                margin: found.limit.map(|limit| limit / timestep),
-                settled_after: found.settled_after,
-            }
-        }))
-    }
-}
-
-impl<const N: usize> Answered for PlanRun<N> {
     fn write(answer: Self::Answer, to: &Address) -> Bytes {
         to.outcome(answer.map(|run| {
             let best = run.planned.best;
@@ -145,6 +93,51 @@ impl<const N: usize> Answered for PlanRun<N> {
                 own: run.planned.own.map(|own| {
                     object! { timestep: own.timestep, evaluations: own.evaluations, error: own.error }
                 }),
+            }
+        }))
+    }
+}
+
+/// A simulated plan.
+#[derive(Debug, Clone)]
+pub struct PlannedRun {
+    /// The cheapest run, and all simulated runs within the error.
+    pub planned: Planned,
+    /// The control period \[s\], if a controller holds the arm: the timestep, unless another was requested.
+    pub control_period: Option<f64>,
+}
+
+// ---- reading and writing --------------------------------------------------------------------------------------------
+
+impl<const N: usize> Ask for SuggestGains<N> {
+    type Answer = Result<Suggested<N>, Refused<GainsError>>;
+
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let ask = Self {
+            settling_time: fields.number("settling_time", Bound::Positive),
+            margin: fields.number("margin", Bound::Finite),
+            timestep: fields.number("timestep", Bound::Positive),
+            method: fields.choice("integrator", &Method::ALL, Method::name),
+            params: fields.object("params", SetParams::from_fields),
+            robot: RobotSettings::read(&mut fields),
+        };
+        if let Some(margin) = ask.margin.filter(|margin| *margin < 1.0) {
+            fields.refuse("margin", &format_args!("must be at least 1, got {margin}"));
+        }
+        fields.accept(ask)
+    }
+
+    fn write(answer: Self::Answer, to: &Address) -> Bytes {
+        to.outcome(answer.as_ref().map(|Suggested { found, timestep }| {
+            object! {
+                kp: found.gains.kp.as_slice(),
+                ki: found.gains.ki.as_slice(),
+                kd: found.gains.kd.as_slice(),
+                timestep_limit: found.limit,
+                certified: found.certified,
+                margin: found.limit.map(|limit| limit / timestep),
+                settled_after: found.settled_after,
             }
         }))
     }

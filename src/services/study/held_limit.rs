@@ -11,7 +11,7 @@ use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::protocol::wire::json;
-use crate::services::{Address, Answered, Ask, Callable};
+use crate::services::{Address, Ask};
 use crate::study::held_loop::{Between, Given, HeldError, HeldLimit, HeldLoop, held_limit};
 use crate::study::held_loop::{MAX_DELAY, MAX_STEPS};
 use crate::study::paused::Paused;
@@ -34,9 +34,7 @@ pub struct FindHeldLimit {
 
 impl Ask for FindHeldLimit {
     type Answer = Result<Box<HeldLimit>, HeldError>;
-}
 
-impl Callable for FindHeldLimit {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let mass = matrix(&mut fields, "mass_matrix");
@@ -69,6 +67,32 @@ impl Callable for FindHeldLimit {
         };
         fields.accept(ask)
     }
+
+    fn write(answer: Result<Box<HeldLimit>, HeldError>, to: &Address) -> Bytes {
+        to.outcome(answer.as_ref().map(|limit| {
+            let critical = limit.critical.as_ref().map(|critical| {
+                object! {
+                    growth_per_period: critical.growth_per_period,
+                    frequency: critical.frequency,
+                    joint: critical.joint,
+                    mode: critical.mode.as_slice(),
+                    reverses: critical.reverses,
+                }
+            });
+            let at = limit.at.as_ref();
+            object! {
+                period_limit: limit.period_limit,
+                critical: critical,
+                effective_inertia: limit.effective_inertia.as_slice(),
+                stable: at.map(|at| at.is_stable),
+                growth_per_period: at.map(|at| at.growth_per_period),
+                timestep_limit: at.and_then(|at| at.timestep_limit),
+                kd_factor_limit: at.and_then(|at| at.kd_factor),
+                armature: at.and_then(|at| at.armature),
+                explanation: limit.explanation.as_str(),
+            }
+        }))
+    }
 }
 
 /// The numbers of a matrix. A number that is not finite is refused with the others.
@@ -94,34 +118,6 @@ fn by_joint(numbers: Vec<f64>, entries: usize) -> Vec<Vec<f64>> {
         0 => vec![],
         given if given == entries => by_row(&numbers),
         _ => vec![numbers],
-    }
-}
-
-impl Answered for FindHeldLimit {
-    fn write(answer: Result<Box<HeldLimit>, HeldError>, to: &Address) -> Bytes {
-        to.outcome(answer.as_ref().map(|limit| {
-            let critical = limit.critical.as_ref().map(|critical| {
-                object! {
-                    growth_per_period: critical.growth_per_period,
-                    frequency: critical.frequency,
-                    joint: critical.joint,
-                    mode: critical.mode.as_slice(),
-                    reverses: critical.reverses,
-                }
-            });
-            let at = limit.at.as_ref();
-            object! {
-                period_limit: limit.period_limit,
-                critical: critical,
-                effective_inertia: limit.effective_inertia.as_slice(),
-                stable: at.map(|at| at.is_stable),
-                growth_per_period: at.map(|at| at.growth_per_period),
-                timestep_limit: at.and_then(|at| at.timestep_limit),
-                kd_factor_limit: at.and_then(|at| at.kd_factor),
-                armature: at.and_then(|at| at.armature),
-                explanation: limit.explanation.as_str(),
-            }
-        }))
     }
 }
 

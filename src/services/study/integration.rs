@@ -13,7 +13,7 @@ use crate::math::particle::{MAX_STEPS, Particle, ParticleError};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
-use crate::services::{Address, Answered, Ask, Callable};
+use crate::services::{Address, Ask};
 
 /// Expression nodes evaluated between two checks of the clock: some hundred microseconds.
 const NODES_PER_LOOK: u64 = 50_000;
@@ -37,10 +37,6 @@ pub struct IntegrationStep {
     pub method: Option<Method>,
     /// Fields that were not valid.
     pub rejected: Rejections,
-}
-
-impl Ask for IntegrationStep {
-    type Answer = Result<Box<Particle>, NotIntegrated>;
 }
 
 /// Why there was no integration.
@@ -112,7 +108,9 @@ fn begin(ask: IntegrationStep) -> Result<Particle, NotIntegrated> {
     }
 }
 
-impl Callable for IntegrationStep {
+impl Ask for IntegrationStep {
+    type Answer = Result<Box<Particle>, NotIntegrated>;
+
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         Ok(Self {
@@ -125,9 +123,7 @@ impl Callable for IntegrationStep {
             rejected: fields.finish(),
         })
     }
-}
 
-impl Answered for IntegrationStep {
     fn write(answer: Result<Box<Particle>, NotIntegrated>, to: &Address) -> Bytes {
         to.outcome(answer.as_ref().map(|particle| {
             object! {

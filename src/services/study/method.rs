@@ -15,9 +15,8 @@ use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections, mistyped};
 use crate::protocol::wire::json;
-use crate::services::FieldByField as _;
 use crate::services::arm::{SetGains, SetParams};
-use crate::services::{Address, Answered, Ask, Callable};
+use crate::services::{Address, Ask};
 use crate::study::control_loop::ControlLoop;
 use crate::study::method::{Analysis, Given, MethodError, NAMES, Swing, Typed};
 use crate::study::method::{analyse, named, swings};
@@ -41,6 +40,32 @@ request! {
         /// The time between two runs of the control law \[s\], not negative; 0 for every step.
         control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
     }
+
+    fn write(answer: Self::Answer, to: &Address) -> Bytes {
+        let answer = answer.map_err(|why| format!("params {why}"));
+        to.outcome(answer.as_ref().map(|analysed| {
+            let Analysed { found, beside } = &**analysed;
+            object! {
+                stages: found.stages,
+                evaluations: found.evaluations,
+                order: found.order,
+                failing_condition: found.failing.as_deref(),
+                embedded_order: found.embedded_order,
+                faults: found.faults.as_slice(),
+                measured_order: found.swing.order,
+                real_limit: found.real_limit,
+                imaginary_limit: found.imaginary_limit,
+                symplectic: found.is_symplectic,
+                region_extent: found.region.extent.as_slice(),
+                region: found.region.rows.as_slice(),
+                timestep_limit_held: found.timestep_limit_held,
+                timestep_limit: found.timestep_limit,
+                swing_evaluations: found.swing.evaluations,
+                methods: Method::ALL.map(Method::name),
+                swing_evaluations_of_methods: beside.map(|it| it.evaluations),
+            }
+        }))
+    }
 }
 
 /// An analysis, and the live arm's methods on the same swing.
@@ -61,9 +86,7 @@ pub struct Beside<A> {
 
 impl<A: Ask> Ask for Beside<A> {
     type Answer = A::Answer;
-}
 
-impl<A: Callable> Callable for Beside<A> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let asked = A::read(service, arguments);
         let mut fields = Fields::read(arguments, service)?;
@@ -77,9 +100,7 @@ impl<A: Callable> Callable for Beside<A> {
             }
         }
     }
-}
 
-impl<A: Answered> Answered for Beside<A> {
     fn write(answer: A::Answer, to: &Address) -> Bytes {
         A::write(answer, to)
     }
@@ -186,34 +207,6 @@ fn coefficients(fields: &mut Fields<'_>, name: &str, row: &[&RawValue]) -> Optio
     });
     let read: Vec<Option<f64>> = read.collect();
     read.into_iter().collect()
-}
-
-impl<const N: usize> Answered for AnalyseMethod<N> {
-    fn write(answer: Self::Answer, to: &Address) -> Bytes {
-        let answer = answer.map_err(|why| format!("params {why}"));
-        to.outcome(answer.as_ref().map(|analysed| {
-            let Analysed { found, beside } = &**analysed;
-            object! {
-                stages: found.stages,
-                evaluations: found.evaluations,
-                order: found.order,
-                failing_condition: found.failing.as_deref(),
-                embedded_order: found.embedded_order,
-                faults: found.faults.as_slice(),
-                measured_order: found.swing.order,
-                real_limit: found.real_limit,
-                imaginary_limit: found.imaginary_limit,
-                symplectic: found.is_symplectic,
-                region_extent: found.region.extent.as_slice(),
-                region: found.region.rows.as_slice(),
-                timestep_limit_held: found.timestep_limit_held,
-                timestep_limit: found.timestep_limit,
-                swing_evaluations: found.swing.evaluations,
-                methods: Method::ALL.map(Method::name),
-                swing_evaluations_of_methods: beside.map(|it| it.evaluations),
-            }
-        }))
-    }
 }
 
 // ---- work -----------------------------------------------------------------------------------------------------------

@@ -17,12 +17,9 @@ use super::{
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
-use crate::protocol::catalog::Service;
-use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::FieldByField as _;
+use crate::services::Address;
 use crate::services::arm::{SetGains, SetParams};
-use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::paused::Paused;
 use crate::study::rollout::{
@@ -61,22 +58,7 @@ request! {
         /// Whether to run a reference too.
         reference: Option<bool> = fields.boolean("reference"),
     }
-}
 
-/// A run, or the reason why there is none.
-pub type RunAnswer<const N: usize> = Result<Box<Ran<N>>, Refused<RolloutError>>;
-
-/// A finished run.
-pub struct Ran<const N: usize> {
-    /// The run.
-    pub run: Rollout<N>,
-    /// The worker's time for the steps, without samples and references.
-    pub took: Duration,
-}
-
-// ---- reading and writing --------------------------------------------------------------------------------------------
-
-impl<const N: usize> Answered for RunOffline<N> {
     fn write(answer: RunAnswer<N>, to: &Address) -> Bytes {
         let Ran { run, took } = match answer {
             Ok(ran) => *ran,
@@ -101,6 +83,19 @@ impl<const N: usize> Answered for RunOffline<N> {
         to.response(&values, "")
     }
 }
+
+/// A run, or the reason why there is none.
+pub type RunAnswer<const N: usize> = Result<Box<Ran<N>>, Refused<RolloutError>>;
+
+/// A finished run.
+pub struct Ran<const N: usize> {
+    /// The run.
+    pub run: Rollout<N>,
+    /// The worker's time for the steps, without samples and references.
+    pub took: Duration,
+}
+
+// ---- reading and writing --------------------------------------------------------------------------------------------
 
 /// A list for each sample, with a number for each joint.
 struct Rows<'a, const N: usize>(&'a [[f64; N]]);

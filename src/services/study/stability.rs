@@ -12,12 +12,9 @@ use super::{arm_of, state_of, with_period};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
-use crate::protocol::catalog::Service;
-use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::FieldByField as _;
+use crate::services::Address;
 use crate::services::arm::{SetGains, SetParams};
-use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
 use crate::study::motion::{FREE_SECONDS, Motion};
@@ -47,23 +44,7 @@ request! {
         /// Velocities there \[rad/s\].
         qd: Option<[f64; N]> = fields.array("qd", Bound::Finite),
     }
-}
 
-/// A prediction.
-pub struct Predicted<const N: usize> {
-    /// The largest stable timesteps.
-    pub limits: Limits<N>,
-    /// The limits of control period and timestep.
-    pub clocks: ClockLimits,
-    /// The coming motion, and its largest timestep.
-    pub motion: Motion,
-    /// Whether the arm is free.
-    pub is_free: bool,
-}
-
-// ---- reading and writing --------------------------------------------------------------------------------------------
-
-impl<const N: usize> Answered for PredictStability<N> {
     fn write(answer: Result<Box<Predicted<N>>, ArmError>, to: &Address) -> Bytes {
         let answer = answer.map_err(|why| format!("params {why}"));
         to.outcome(answer.as_ref().map(|predicted| {
@@ -102,6 +83,20 @@ impl<const N: usize> Answered for PredictStability<N> {
         }))
     }
 }
+
+/// A prediction.
+pub struct Predicted<const N: usize> {
+    /// The largest stable timesteps.
+    pub limits: Limits<N>,
+    /// The limits of control period and timestep.
+    pub clocks: ClockLimits,
+    /// The coming motion, and its largest timestep.
+    pub motion: Motion,
+    /// Whether the arm is free.
+    pub is_free: bool,
+}
+
+// ---- reading and writing --------------------------------------------------------------------------------------------
 
 // ---- work -----------------------------------------------------------------------------------------------------------
 

@@ -71,7 +71,7 @@ use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::{FinishAll, RefuseCalls};
-use pendularm::actors::resources::long_work::{PLACES, WorkKind, WorkPermit};
+use pendularm::actors::resources::long_work::{THREADS_OF_A_KIND, WorkKind, WorkPermit};
 use pendularm::actors::resources::memory::Memory;
 use pendularm::options::{Options, Parsed};
 use pendularm::protocol::catalog::{Rosapi, Service};
@@ -265,7 +265,7 @@ impl World {
                     "busy" => &[WorkKind::Long, WorkKind::Listing],
                     _ => &[],
                 };
-                for kind in kinds.repeat(PLACES) {
+                for kind in kinds.repeat(THREADS_OF_A_KIND) {
                     self.busy.extend(WorkPermit::take(kind).await);
                 }
                 settle().await;

@@ -10,7 +10,6 @@ mod turns;
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use crate::askers::{PATIENCE, PoolBench, ask_as};
@@ -24,7 +23,6 @@ use pendularm::actors::arm::sim::{
 use pendularm::actors::compute::study::{IntegrationStep, PredictStability, RunOffline, Study};
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::Nodes;
-use pendularm::actors::node::Unserved;
 use pendularm::actors::resources::work_clock;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;

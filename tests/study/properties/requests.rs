@@ -4,7 +4,7 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::op::Arguments;
-use pendularm::services::Callable;
+use pendularm::services::Ask;
 use pendularm::services::study::{
     AnalyseMethod, Beside, Computed, PlanRun, PredictStability, Present, RunOffline, SuggestGains,
     Work as _,
@@ -123,7 +123,7 @@ fn present<const N: usize>() -> Present<N> {
 }
 
 /// The number of pieces of a computation; `None` if the request is refused.
-fn pieces<const N: usize, T: Callable + Computed<N>>(service: Service, text: &str) -> Option<u64> {
+fn pieces<const N: usize, T: Ask + Computed<N>>(service: Service, text: &str) -> Option<u64> {
     let raw = RawValue::from_string(text.to_owned()).unwrap();
     let ask = T::read(service, &Arguments::from(raw)).ok()?;
     let mut work = ask.work(present());
@@ -171,7 +171,7 @@ fn every_request_of_the_study_ends() {
     assert!(tally.tried > tally.open / 8, "{tally:?}");
 }
 
-fn answer<T: Callable + Computed<2>>(service: Service, text: &str) -> T::Answer {
+fn answer<T: Ask + Computed<2>>(service: Service, text: &str) -> T::Answer {
     let raw = RawValue::from_string(text.to_owned()).unwrap();
     let ask = T::read(service, &Arguments::from(raw)).unwrap();
     let mut work = ask.work(present());

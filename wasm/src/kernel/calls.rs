@@ -17,7 +17,7 @@ use pendularm::services::study::{
     Computed, PlanRun, PredictStability, Present, RunOffline, SuggestGains, Work,
 };
 use pendularm::services::trial::TrialRequest;
-use pendularm::services::{Address, Answered, Callable as _, NoService};
+use pendularm::services::{Address, Ask, NoService};
 
 use super::Kernel;
 use super::computing::Answering;
@@ -92,7 +92,7 @@ impl<const N: usize> Kernel<N> {
     }
 
     /// Reads a question, answers it, and writes the answer after all reports of goals.
-    fn answer<A: Answered>(
+    fn answer<A: Ask>(
         &mut self,
         service: Service,
         args: &Arguments,
@@ -109,19 +109,14 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    fn of_arm<A: Answered + ArmRequest<N>>(
-        &mut self,
-        service: Service,
-        args: &Arguments,
-        to: &Address,
-    ) {
+    fn of_arm<A: ArmRequest<N>>(&mut self, service: Service, args: &Arguments, to: &Address) {
         self.answer::<A>(service, args, to, |kernel, ask| {
             ask.perform(&mut kernel.arm)
         });
     }
 
     /// Takes all steps, with the reports of the goal in between.
-    fn step(&mut self, ask: Step<N>) -> <Step<N> as pendularm::services::Ask>::Answer {
+    fn step(&mut self, ask: Step<N>) -> <Step<N> as Ask>::Answer {
         let mut asked = self.arm.begin_steps(ask)?;
         loop {
             let (stepped, progress) = self.arm.take_row(&mut asked);
@@ -135,7 +130,7 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    fn begin<A: Answered, W: Work<A::Answer> + 'static>(
+    fn begin<A: Ask, W: Work<A::Answer> + 'static>(
         &mut self,
         service: Service,
         args: &Arguments,

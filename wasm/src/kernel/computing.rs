@@ -6,7 +6,7 @@ use std::marker::PhantomData;
 
 use bytes::Bytes;
 use pendularm::services::study::Work;
-use pendularm::services::{Address, Answered};
+use pendularm::services::{Address, Ask};
 
 use super::Clock;
 
@@ -33,7 +33,7 @@ impl<A, W> Answering<A, W> {
     }
 }
 
-impl<A: Answered, W: Work<A::Answer>> Computation for Answering<A, W> {
+impl<A: Ask, W: Work<A::Answer>> Computation for Answering<A, W> {
     fn advance(&mut self, clock: Clock) -> Option<Bytes> {
         let answer = self.work.advance(clock)?;
         Some(A::write(answer, &self.to))

@@ -1,37 +1,28 @@
-//! Goals: at most one is active, as in the node `ik_action`.
+//! Goals. The rules are in `live::ik_action`, as for the node `ik_action`.
 //!
-//! **Invariant:** each goal has exactly one result. A preempting goal comes in this order: the old goal's result, the
-//! response, the trajectory, feedback, result.
+//! **Invariant:** each goal is in motion before the next frame is taken.
 
-use pendularm::live::{GoalOrder, GoalProgress, Obstacle};
-use pendularm::math::goal::Outcome;
+use pendularm::live::{GoalProgress, GoalReport, Obstacle, World as _, cancelled};
 use pendularm::math::kinematics::Unreachable;
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages::Level;
 use pendularm::services::goals::{AcceptedGoal, CancelRejected, GoalRequest};
-use pendularm::services::{Address, Answered as _};
+use pendularm::services::{Address, Ask as _};
 
-use super::Kernel;
-
-/// The active goal.
-#[derive(Clone)]
-pub(super) struct ActiveGoal<const N: usize> {
-    pub(super) goal: AcceptedGoal<N>,
-    /// Whether it is a goal of the trial.
-    pub(super) of_trial: bool,
-}
+use super::{GoalOwner, Kernel};
 
 impl<const N: usize> Kernel<N> {
     /// Takes a goal of the client.
     pub(super) fn take_goal(&mut self, goal: GoalRequest<N>, to: &Address) {
-        let begun = self.begin_goal(goal, false);
-        if let Ok(Some(obstacle)) = begun {
-            self.warn(to, obstacle);
-        }
-        let answer = begun.map(|_| self.goal_id());
-        self.send(GoalRequest::<N>::write(answer, to));
-        if begun.is_ok() {
-            self.set_in_motion();
+        match self.begin_goal(goal, GoalOwner::Client) {
+            Err(why) => self.send(GoalRequest::<N>::write(Err(why), to)),
+            Ok((goal, obstacle)) => {
+                if let Some(obstacle) = obstacle {
+                    self.warn(to, obstacle);
+                }
+                self.send(GoalRequest::<N>::write(Ok(goal.id.clone()), to));
+                self.set_in_motion(goal);
+            }
         }
     }
 
@@ -40,82 +31,49 @@ impl<const N: usize> Kernel<N> {
         self.tell(Level::Warning, &obstacle.to_string(), to.id());
     }
 
-    fn goal_id(&self) -> String {
-        let active = self.goal.as_ref();
-        active.map_or_else(String::new, |active| active.goal.id.clone())
-    }
-
     /// Solves a goal and replaces the previous one. Call [`Kernel::set_in_motion`] next.
     pub(super) fn begin_goal(
         &mut self,
         goal: GoalRequest<N>,
-        of_trial: bool,
-    ) -> Result<Option<Obstacle>, Unreachable> {
-        let GoalRequest { target, criteria } = goal;
-        let number = self.accepted + 1;
-        let tracking = self.arm.track_goal(&GoalOrder {
-            number,
-            target,
-            criteria,
-        })?;
-        if let Some(before) = tracking.before {
-            self.judge(before);
-        }
-        self.accepted = number;
-        self.goal = Some(ActiveGoal {
-            goal: AcceptedGoal::new(number, target, tracking.positions),
-            of_trial,
-        });
-        Ok(tracking.obstacle)
+        owner: GoalOwner,
+    ) -> Result<(AcceptedGoal<N>, Option<Obstacle>), Unreachable> {
+        let order = self.goals.order(goal);
+        let tracking = self.arm.track_goal(&order)?;
+        let (before, goal) = self.goals.accept(&order, owner, &tracking);
+        self.pass_on(before);
+        Ok((goal, tracking.obstacle))
     }
 
-    /// Sends the active goal's setpoint to the subscribers, and then to the arm.
-    pub(super) fn set_in_motion(&mut self) {
-        if let Some(ActiveGoal { goal, .. }) = &self.goal {
-            let (number, positions, goal) = (goal.number, goal.positions, goal.clone());
-            self.arm
-                .publish(Topic::JointTrajectory, move || goal.trajectory());
-            self.arm.command_goal(number, positions);
-        }
+    /// Sends the goal's setpoint to the subscribers, and then to the arm.
+    pub(super) fn set_in_motion(&mut self, goal: AcceptedGoal<N>) {
+        let (number, positions) = (goal.number, goal.positions);
+        self.arm
+            .publish(Topic::JointTrajectory, move || goal.trajectory());
+        self.arm.command_goal(number, positions);
     }
 
     /// Ends the active goal, if it has the given id.
-    pub(super) fn cancel(&mut self, meant: Option<&str>) -> Result<(), CancelRejected> {
-        let goal = &self.goal.as_ref().ok_or(CancelRejected::NotActive)?.goal;
-        if meant.is_some_and(|id| id != goal.id) {
-            let active = goal.id.clone();
-            return Err(CancelRejected::OtherGoal { active });
+    pub(super) fn cancel(&mut self, goal_id: Option<&str>) -> Result<(), CancelRejected> {
+        let number = self.goals.to_cancel(goal_id)?;
+        let latest = self.arm.end_goal(number);
+        if let Some(latest) = latest {
+            self.judge(latest);
         }
-        let ended = self.arm.end_goal(goal.number);
-        let ended = ended.ok_or(CancelRejected::NotActive)?;
-        self.judge(ended);
-        match ended.outcome {
-            Some(Outcome::Preempted) => Ok(()),
-            _ => Err(CancelRejected::NotActive),
-        }
+        cancelled(latest)
     }
 
     /// Sends feedback or the end of the active goal.
     pub(super) fn judge(&mut self, progress: GoalProgress<N>) {
-        let is_active = |active: &ActiveGoal<N>| active.goal.number == progress.number;
-        match progress.outcome {
-            None => {
-                if let Some(active) = self.goal.as_ref().filter(|goal| is_active(goal)) {
-                    let feedback = active.goal.feedback(progress.distance, progress.elapsed);
-                    self.arm.publish(Topic::IkFeedback, move || feedback);
-                    if active.of_trial {
-                        self.news.push_back((active.clone(), progress));
-                    }
-                }
-            }
-            Some(_) => {
-                if let Some(ended) = self.goal.take_if(|goal| is_active(goal)) {
-                    let result = ended.goal.result(progress.distance, progress.outcome);
-                    self.arm.publish(Topic::IkResult, move || result);
-                    if ended.of_trial {
-                        self.news.push_back((ended, progress));
-                    }
-                }
+        let report = self.goals.report(progress);
+        self.pass_on(report);
+    }
+
+    fn pass_on(&mut self, report: Option<(GoalReport<N>, GoalOwner)>) {
+        if let Some((report, owner)) = report {
+            let (topic, frame) = report.message();
+            self.arm.world().publish(topic, frame);
+            if owner == GoalOwner::Trial {
+                self.news.push_back(report);
             }
         }
     }

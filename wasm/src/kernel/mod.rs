@@ -13,11 +13,10 @@ mod trials;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use pendularm::live::{GoalProgress, LiveArm};
+use pendularm::live::{GoalReport, IkGoals, IkTrials, LiveArm};
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
 use pendularm::math::simulation::Simulation;
-use pendularm::math::trial::Trial;
 use pendularm::protocol::catalog::{Direction, Topic};
 use pendularm::protocol::messages::{self, ErrorForm, Level};
 use pendularm::protocol::op::{self, Op, OpError, Verbosity};
@@ -27,11 +26,18 @@ use pendularm::services::trajectory::read_setpoint;
 use pendularm::study::clocks::clock_limits;
 
 use self::computing::Computation;
-use self::goals::ActiveGoal;
 use self::surroundings::Surroundings;
 
 /// The allowed numbers of links.
 pub const LINKS: [usize; 2] = [2, 3];
+
+/// The sender of a goal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum GoalOwner {
+    #[default]
+    Client,
+    Trial,
+}
 
 /// The time since a fixed moment.
 pub type Clock = fn() -> Duration;
@@ -42,13 +48,10 @@ pub struct Kernel<const N: usize> {
     /// The client's level of statuses.
     verbosity: Verbosity,
     error_form: ErrorForm,
-    goal: Option<ActiveGoal<N>>,
-    /// Goals accepted so far: their numbers make the ids.
-    accepted: u64,
-    trial: Trial,
-    rng: fastrand::Rng,
+    goals: IkGoals<N, GoalOwner>,
+    trial: IkTrials<N>,
     /// News of goals that the trial has not handled.
-    news: VecDeque<(ActiveGoal<N>, GoalProgress<N>)>,
+    news: VecDeque<GoalReport<N>>,
     /// The time of the trial's last published status.
     trial_shown: Duration,
     computations: VecDeque<Box<dyn Computation>>,
@@ -62,15 +65,14 @@ where
     #[must_use]
     pub fn new(clock: Clock, seed: u64) -> Self {
         let world = Surroundings::new(clock);
+        let mut rng = fastrand::Rng::with_seed(seed);
         Self {
             arm: LiveArm::new(Arm::default(), Gains::default(), world),
             // The default level over WebSocket.
             verbosity: Verbosity::NONE,
             error_form: ErrorForm::Text,
-            goal: None,
-            accepted: 0,
-            trial: Trial::default(),
-            rng: fastrand::Rng::with_seed(seed),
+            goals: IkGoals::default(),
+            trial: IkTrials::new(move || rng.f64()),
             news: VecDeque::new(),
             trial_shown: Duration::ZERO,
             computations: VecDeque::new(),

@@ -62,11 +62,6 @@ impl<const N: usize> Surroundings<N> {
         all.retain(|one| one.topic != topic);
     }
 
-    pub(super) fn wants(&self, topic: Topic) -> bool {
-        let all = self.subscriptions.borrow();
-        all.iter().any(|one| one.topic == topic)
-    }
-
     /// Sends the message of `write`, if a subscription is due.
     fn deliver(&self, topic: Topic, write: impl FnOnce() -> Bytes) {
         let mut all = self.subscriptions.borrow_mut();

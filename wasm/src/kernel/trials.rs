@@ -1,48 +1,30 @@
-//! Timed trials, as in the node `ik_trial`. The rules are in `math::trial`.
+//! Timed trials. The rules are in `live::ik_trial`, as for the node `ik_trial`.
 //!
 //! **Invariant:** each command of the trial is completed before the next, and news of its goals are handled after the
 //! commands.
 
 use std::time::Duration;
 
-use pendularm::live::World as _;
-use pendularm::math::trial::{Conclusion, Rejection, TrialCommand, sample};
+use pendularm::live::{GoalAnswer, World as _};
+use pendularm::math::trial::TrialCommand;
 use pendularm::protocol::catalog::Topic;
 use pendularm::services::Address;
 use pendularm::services::goals::GoalRequest;
-use pendularm::services::trial::{
-    STATUS_PERIOD, Terms, TrialRefused, TrialRequest, status_message,
-};
+use pendularm::services::trial::{STATUS_PERIOD, Terms, TrialRequest};
 
-use super::Kernel;
+use super::{GoalOwner, Kernel};
 
 impl<const N: usize> Kernel<N> {
     /// Advances the trial to the present time, executes its commands, and passes it the news of its goals.
     pub(super) fn advance_trial(&mut self) {
         loop {
-            let commands = self.trial.tick(self.arm.pose().simulated);
+            let commands = self.trial.tick(&self.arm.pose());
             self.carry_out(commands);
-            let Some((active, progress)) = self.news.pop_front() else {
+            let Some(report) = self.news.pop_front() else {
                 return;
             };
-            let goal_id = active.goal.id;
-            match progress.outcome {
-                None => {
-                    self.trial
-                        .feedback(&goal_id, progress.distance, &active.goal.positions);
-                }
-                Some(outcome) => {
-                    let conclusion = Conclusion {
-                        goal_id,
-                        outcome,
-                        final_distance: progress.distance,
-                    };
-                    let lengths = self.arm.pose().lengths;
-                    let target = || sample(&lengths, || self.rng.f64());
-                    let commands = self.trial.concluded(conclusion, target);
-                    self.carry_out(commands);
-                }
-            }
+            let commands = self.trial.report(report);
+            self.carry_out(commands);
         }
     }
 
@@ -61,61 +43,32 @@ impl<const N: usize> Kernel<N> {
                     target,
                     criteria,
                 } => {
-                    let begun = self.begin_goal(GoalRequest { target, criteria }, true);
-                    let lengths = self.arm.pose().lengths;
-                    let sampled = || sample(&lengths, || self.rng.f64());
-                    let more = match (begun, &self.goal) {
-                        (Ok(_), Some(active)) => {
-                            self.trial.accepted(ticket, &active.goal.id, sampled)
-                        }
-                        _ => self.trial.refused(ticket, sampled),
-                    };
-                    if begun.is_ok() {
-                        self.set_in_motion();
+                    let goal = GoalRequest { target, criteria };
+                    let begun = self.begin_goal(goal, GoalOwner::Trial).ok();
+                    let goal = begun.map(|(goal, _)| goal);
+                    waiting.extend(self.trial.answered(GoalAnswer {
+                        ticket,
+                        goal_id: goal.as_ref().map(|goal| goal.id.clone()),
+                        lengths: Some(self.arm.pose().lengths),
+                    }));
+                    if let Some(goal) = goal {
+                        self.set_in_motion(goal);
                     }
-                    waiting.extend(more);
                 }
             }
         }
     }
 
-    /// Performs a request about the trial.
+    /// Performs a request about the trial. The caller gets a warning if the arm cannot move.
     pub(super) fn change_trial(&mut self, ask: TrialRequest, to: &Address) -> Terms {
-        let pose = self.arm.pose();
-        let target = || sample(&pose.lengths, || self.rng.f64());
-        let outcome = match ask {
-            TrialRequest::Start { rejected, .. } if !rejected.is_empty() => {
-                Err(TrialRefused::Rejected(rejected))
+        let outcome = self.trial.decide(ask, &self.arm.pose());
+        let outcome = outcome.map(|(commands, obstacle)| {
+            if let Some(obstacle) = obstacle {
+                self.warn(to, obstacle);
             }
-            TrialRequest::Start { changes, .. } => {
-                let decided = self.trial.start(pose.simulated, changes, target);
-                self.decide(decided, Some(to))
-            }
-            TrialRequest::Skip => {
-                let decided = self.trial.skip(target);
-                self.decide(decided, Some(to))
-            }
-            TrialRequest::Stop => {
-                let decided = self.trial.stop();
-                self.decide(decided, None)
-            }
-        };
-        let settings = self.trial.settings();
-        Terms { settings, outcome }
-    }
-
-    /// Executes the commands. The caller gets a warning if the arm cannot move.
-    fn decide(
-        &mut self,
-        decided: Result<Vec<TrialCommand>, Rejection>,
-        warned: Option<&Address>,
-    ) -> Result<(), TrialRefused> {
-        let commands = decided?;
-        if let (Some(to), Some(obstacle)) = (warned, self.arm.pose().obstacle) {
-            self.warn(to, obstacle);
-        }
-        self.carry_out(commands);
-        Ok(())
+            self.carry_out(commands);
+        });
+        self.trial.terms(outcome)
     }
 
     /// At a tick: publishes the trial's status if it is due.
@@ -128,11 +81,8 @@ impl<const N: usize> Kernel<N> {
 
     fn publish_status(&mut self) {
         self.trial_shown = self.arm.world().now();
-        let topic = Topic::TrialStatus;
-        let status = self.trial.status();
-        if let Some(status) = status.filter(|_| self.arm.world().wants(topic)) {
-            let message = status_message(&status);
-            self.arm.publish(topic, move || message);
+        if let Some(status) = self.trial.status() {
+            self.arm.publish(Topic::TrialStatus, move || status);
         }
     }
 }

@@ -15,7 +15,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::time::{Duration, Instant};
 
 use fleet::{Fleet, Outcome, Scene, Traffic};
-use pendularm_benches::program::{Program, processor};
+use pendularm_benches::program::{Program, ThreadWork, threads, threads_since};
 use pendularm_benches::protocol::Protocol;
 
 /// The rate of the arm's topics, and of all publishers that do not flood.
@@ -51,8 +51,19 @@ struct Server {
     protocol: Protocol,
     address: SocketAddr,
     pid: u32,
-    /// Processor time in a second without clients, at the start \[ns\].
-    rest: f64,
+}
+
+/// The work of a server's threads without clients, for `seconds`.
+pub struct Rest {
+    pub threads: Vec<ThreadWork>,
+    pub seconds: f64,
+}
+
+impl Rest {
+    /// Processor time in a second \[ns\].
+    pub fn processor(&self) -> f64 {
+        self.threads.iter().map(|one| one.processor).sum::<u64>() as f64 / self.seconds
+    }
 }
 
 /// The work of a server in a scene.
@@ -66,11 +77,6 @@ pub struct Played {
     pub calls: Vec<u32>,
     /// Simulation time by wall time beside it, the arm's.
     pub clock: Option<f64>,
-}
-
-/// Whether the arm's time and a caller's time are also measured.
-fn is_probed(scene: &Scene) -> bool {
-    scene.subscribers >= 250 || scene.traffic == Traffic::Flood
 }
 
 fn main() {
@@ -95,7 +101,7 @@ fn main() {
         }
     } else {
         Plan {
-            rounds: 3,
+            rounds: 5,
             seconds: 3.0,
             probed_seconds: 8.0,
             bars: true,
@@ -108,18 +114,19 @@ fn main() {
             protocol,
             address,
             pid,
-            rest: rest(pid, plan.seconds),
         })
         .collect();
-    report::print_rest(&servers);
+    let resting = rest_in_turn(&servers, &plan);
+    report::print_rest(&resting);
     let mut verdicts = Vec::new();
     for scene in &SCENES {
-        let played = play(scene, &servers, &plan);
+        let played = play(scene, &servers, &resting, &plan);
         report::print_scene(scene, &played);
         verdicts.push((*scene, played));
     }
+    report::print_threads(&resting, &verdicts);
     if plan.bars {
-        report::print_bars(&verdicts);
+        report::print_bars(&resting, &verdicts);
     } else {
         println!("\nnothing was lost, nothing came out of order; too short a run for bars");
     }
@@ -145,15 +152,37 @@ fn peer(text: &str) -> (Protocol, SocketAddr, u32) {
     )
 }
 
-/// Processor time that a server takes in a second without clients \[ns\].
-fn rest(pid: u32, seconds: f64) -> f64 {
-    let (before, began) = (processor(pid), Instant::now());
+/// Measures a server without clients.
+fn rest(pid: u32, seconds: f64) -> Rest {
+    let (before, began) = (threads(pid), Instant::now());
     std::thread::sleep(Duration::from_secs_f64(seconds));
-    (processor(pid) - before) as f64 / began.elapsed().as_secs_f64()
+    Rest {
+        threads: threads_since(pid, &before),
+        seconds: began.elapsed().as_secs_f64(),
+    }
+}
+
+/// Measures each server without clients, in turn for all rounds.
+fn rest_in_turn(servers: &[Server], plan: &Plan) -> Vec<(Protocol, Vec<Rest>)> {
+    let mut rests: Vec<_> = servers
+        .iter()
+        .map(|one| (one.protocol, Vec::new()))
+        .collect();
+    for _ in 0..plan.rounds {
+        for (server, (_, rests)) in servers.iter().zip(&mut rests) {
+            rests.push(rest(server.pid, plan.seconds));
+        }
+    }
+    rests
 }
 
 /// Plays a scene to each server in turn for all rounds, then once more with probes.
-fn play(scene: &Scene, servers: &[Server], plan: &Plan) -> Vec<(Protocol, Played)> {
+fn play(
+    scene: &Scene,
+    servers: &[Server],
+    resting: &[(Protocol, Vec<Rest>)],
+    plan: &Plan,
+) -> Vec<(Protocol, Played)> {
     let takes_part = |server: &&Server| match server.protocol {
         Protocol::Pendularm => true,
         Protocol::Redis | Protocol::Mosquitto => scene.traffic != Traffic::Arm,
@@ -170,23 +199,21 @@ fn play(scene: &Scene, servers: &[Server], plan: &Plan) -> Vec<(Protocol, Played
             let index = (round + turn) % servers.len();
             let server = servers[index];
             // It changes in minutes by more than few deliveries take, so then it is measured beside them.
-            let at_rest = if scene.is_light() {
-                rest(server.pid, plan.seconds)
-            } else {
-                server.rest
+            let mut starts = resting.iter().filter(|(one, _)| *one == server.protocol);
+            let at_start = starts.find_map(|(_, rests)| rests.get(round));
+            let at_rest = match at_start {
+                Some(at_start) if !scene.is_light() => at_start.processor(),
+                _ => rest(server.pid, plan.seconds).processor(),
             };
-            let outcome =
-                Fleet::open(server.protocol, server.address, *scene).run(server.pid, plan.seconds);
-            let played = &mut played[index].1;
-            played.rests.push(at_rest);
-            played.outcomes.push(outcome);
+            played[index].1.rests.push(at_rest);
+            let fleet = Fleet::open(server.protocol, server.address, *scene);
+            let outcome = fleet.run(server.pid, plan.seconds);
+            played[index].1.outcomes.push(outcome);
         }
     }
-    if is_probed(scene) {
-        for (server, (protocol, played)) in servers.iter().zip(&mut played) {
-            if *protocol != Protocol::Bare {
-                probe(scene, server, plan.probed_seconds, played);
-            }
+    for (server, (protocol, played)) in servers.iter().zip(&mut played) {
+        if *protocol != Protocol::Bare {
+            probe(scene, server, plan.probed_seconds, played);
         }
     }
     played

@@ -1,27 +1,102 @@
 //! The figures in words: a table for each scene, and the bars at the end.
 //!
-//! **Invariant:** medians of the rounds are compared, with the better peer.
+//! **Invariant:** medians of the rounds are compared.
 
 use crate::fleet::{Scene, Traffic};
 use crate::message::Template;
-use crate::{Played, Server};
+use crate::{Played, Rest};
+use pendularm_benches::program::ThreadWork;
 use pendularm_benches::protocol::Protocol;
 
 /// Largest drift of simulation time by wall time from 1.
 const MOST_DRIFT: f64 = 0.001;
 /// For 99 of 100 calls \[ms\].
 const MOST_DELAY: f64 = 5.0;
+/// Without clients \[% of a core\].
+const MOST_AT_REST: f64 = 0.15;
+/// Without clients, in a second.
+const MOST_WAKE_UPS: f64 = 25.0;
 
-pub fn print_rest(servers: &[Server]) {
+pub fn print_rest(resting: &[(Protocol, Vec<Rest>)]) {
     println!(
         "a message: {} bytes of JSON, made by the same client for all",
         Template::new().length()
     );
-    let part = |one: &Server| format!("{} {:.2} %", one.protocol.name(), one.rest / 1e7);
+    for (protocol, rests) in resting {
+        let [percent, wake_ups] = at_rest(rests);
+        let name = protocol.name();
+        println!("{name:<10} without clients: {percent:.2} % of a core, {wake_ups:.0} wake-ups/s");
+    }
+}
+
+/// Part of a core \[%\], and wake-ups in a second: medians of the rounds.
+fn at_rest(rests: &[Rest]) -> [f64; 2] {
+    let wake_ups = |rest: &Rest| {
+        let all = rest.threads.iter().map(|thread| thread.wake_ups);
+        all.sum::<u64>() as f64 / rest.seconds
+    };
+    [
+        median(rests.iter().map(|rest| rest.processor() / 1e7).collect()),
+        median(rests.iter().map(wake_ups).collect()),
+    ]
+}
+
+/// The work of each thread in a second of the scenes with a rate: means of the rounds. Threads that do nothing are left out.
+pub fn print_threads(
+    resting: &[(Protocol, Vec<Rest>)],
+    scenes: &[(Scene, Vec<(Protocol, Played)>)],
+) {
+    println!("\n=== threads, in a second");
     println!(
-        "of one core without clients: {}",
-        servers.iter().map(part).collect::<Vec<_>>().join(", ")
+        "{:<18} {:<10} {:<18} {:>10} {:>10} {:>12}",
+        "", "", "thread", "CPU, ms", "wake-ups", "preemptions"
     );
+    for (protocol, rests) in resting {
+        let rounds = rests.iter().map(|rest| (&rest.threads[..], rest.seconds));
+        print_work("without clients", *protocol, rounds);
+    }
+    let with_rate = scenes
+        .iter()
+        .filter(|(scene, _)| scene.traffic != Traffic::Flood);
+    for (scene, played) in with_rate {
+        for (protocol, played) in played {
+            let rounds = played.outcomes.iter();
+            let rounds = rounds.map(|one| (&one.threads[..], one.seconds));
+            print_work(scene.name, *protocol, rounds);
+        }
+    }
+}
+
+fn print_work<'a>(
+    scene: &str,
+    protocol: Protocol,
+    rounds: impl Iterator<Item = (&'a [ThreadWork], f64)>,
+) {
+    let mut all: Vec<ThreadWork> = Vec::new();
+    let mut seconds = 0.0;
+    for (threads, measured) in rounds {
+        seconds += measured;
+        for thread in threads {
+            match all.iter_mut().find(|one| one.id == thread.id) {
+                Some(one) => {
+                    one.processor += thread.processor;
+                    one.wake_ups += thread.wake_ups;
+                    one.preemptions += thread.preemptions;
+                }
+                None => all.push(thread.clone()),
+            }
+        }
+    }
+    for thread in all.iter().filter(|one| one.wake_ups > 0) {
+        println!(
+            "{scene:<18} {:<10} {:<18} {:>10.2} {:>10.1} {:>12.1}",
+            protocol.name(),
+            thread.name,
+            thread.processor as f64 / 1e6 / seconds,
+            thread.wake_ups as f64 / seconds,
+            thread.preemptions as f64 / seconds,
+        );
+    }
 }
 
 pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)]) {
@@ -85,90 +160,89 @@ pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)]) {
     }
 }
 
-pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)]) {
+pub fn print_bars(resting: &[(Protocol, Vec<Rest>)], scenes: &[(Scene, Vec<(Protocol, Played)>)]) {
     println!("\n=== summary");
-    // The arm's own topic has no peers. It is compared with the same fan-out between clients.
-    let peers_of = |scene: &Scene| {
-        let name = if scene.traffic == Traffic::Arm {
-            "60 Hz to 250"
-        } else {
-            scene.name
+    for (protocol, rests) in resting {
+        if *protocol == Protocol::Pendularm {
+            let [percent, wake_ups] = at_rest(rests);
+            let what = "without clients: % of a core";
+            verdict(
+                what,
+                percent,
+                &format!("at most {MOST_AT_REST}"),
+                percent <= MOST_AT_REST,
+            );
+            let what = "without clients: wake-ups/s";
+            let bar = format!("at most {MOST_WAKE_UPS}");
+            verdict(what, wake_ups, &bar, wake_ups <= MOST_WAKE_UPS);
+        }
+    }
+    for (scene, _) in scenes {
+        // The arm's own topic has no peers. It is compared with the same fan-out between clients.
+        let peers = match scene.traffic {
+            Traffic::Arm => "60 Hz to 250",
+            _ => scene.name,
         };
-        scenes
-            .iter()
-            .find(|(other, _)| other.name == name)
-            .map(|(_, played)| played)
-    };
-    for (scene, played) in scenes {
-        let Some((_, ours)) = played
-            .iter()
-            .find(|(protocol, _)| *protocol == Protocol::Pendularm)
-        else {
+        let find = |name: &str, wanted| {
+            let mut all = scenes.iter().filter(|(scene, _)| scene.name == name);
+            let mut all = all.next().into_iter().flat_map(|(_, played)| played);
+            all.find_map(|(protocol, played)| (*protocol == wanted).then_some(played))
+        };
+        let Some(ours) = find(scene.name, Protocol::Pendularm) else {
             continue;
         };
-        let peers: Vec<_> = peers_of(scene)
-            .into_iter()
-            .flatten()
-            .filter(|(protocol, _)| matches!(protocol, Protocol::Redis | Protocol::Mosquitto))
-            .collect();
-        if !peers.is_empty() {
-            let to_best = |one: &Played, cost: fn(&Played) -> f64| {
-                let costs = peers.iter().map(|(_, peer)| cost(peer));
-                cost(one) / costs.fold(f64::INFINITY, f64::min)
+        let (reference, most) = bar(scene);
+        for protocol in [Protocol::Bare, Protocol::Redis, Protocol::Mosquitto] {
+            let Some(peer) = find(peers, protocol) else {
+                continue;
             };
-            let ratios = |one: &Played| (to_best(one, |one| median(costs(one))), to_best(one, net));
-            let (ratio, net) = ratios(ours);
+            let ratio = median(costs(ours)) / median(costs(peer));
+            let net = net(ours) / net(peer);
+            let name = protocol.name();
             let what = format!(
-                "{}: CPU per delivery / better peer (less rest {net:.2})",
+                "{}: CPU per delivery / {name} (less rest {net:.2})",
                 scene.name
             );
-            let (most, less_rest) = most_of_peer(scene);
-            let of = if less_rest { " less rest" } else { "" };
-            verdict(
-                &what,
-                format!("{ratio:.2}"),
-                &format!("at most {most:.1}{of}"),
-                (if less_rest { net } else { ratio }) < most + 0.005,
-            );
-            if let Some((_, bare)) = played.iter().find(|(one, _)| *one == Protocol::Bare) {
-                let (ratio, net) = ratios(bare);
-                println!("    bare actors beside it (less rest {net:.2}) {ratio:>39.2}");
+            if protocol != reference {
+                println!("{what:<72} {ratio:>9.3}");
+            } else if scene.is_light() {
+                verdict(
+                    &what,
+                    ratio,
+                    &format!("at most {most} less rest"),
+                    net <= most,
+                );
+            } else {
+                verdict(&what, ratio, &format!("at most {most}"), ratio <= most);
             }
         }
         if let Some(clock) = ours.clock {
             let what = format!("{}: simulation time / wall time", scene.name);
-            verdict(
-                &what,
-                format!("{clock:.5}"),
-                "within 0.001 of 1",
-                (clock - 1.0).abs() <= MOST_DRIFT,
-            );
+            let is_close = (clock - 1.0).abs() <= MOST_DRIFT;
+            verdict(&what, clock, "within 0.001 of 1", is_close);
         }
         if !ours.calls.is_empty() {
             let p99 = quantile(&ours.calls, 0.99).unwrap_or_default();
-            verdict(
-                &format!("{}: call beside it, p99, ms", scene.name),
-                format!("{p99:.2}"),
-                "under 5",
-                p99 < MOST_DELAY,
-            );
+            let what = format!("{}: call beside it, p99, ms", scene.name);
+            verdict(&what, p99, "under 5", p99 < MOST_DELAY);
         }
     }
 }
 
-/// Largest processor time for a delivery, as a share of the better peer's, and whether the time at rest is left out of
-/// it. With few subscribers that is most of the figure, and ours simulates an arm meanwhile.
-const fn most_of_peer(scene: &Scene) -> (f64, bool) {
+/// The program whose processor time for a delivery is compared, and the largest ratio to it. With few subscribers the
+/// time at rest is left out: it is most of the figure, and ours simulates an arm meanwhile.
+const fn bar(scene: &Scene) -> (Protocol, f64) {
     match scene.traffic {
-        Traffic::Flood => (1.0, false),
-        _ if scene.is_light() => (1.5, true),
-        _ => (1.1, false),
+        Traffic::Flood => (Protocol::Redis, 1.0),
+        Traffic::Arm => (Protocol::Redis, 1.1),
+        Traffic::Rate(_) if scene.is_light() => (Protocol::Bare, 1.5),
+        Traffic::Rate(_) => (Protocol::Bare, 1.2),
     }
 }
 
-fn verdict(what: &str, figure: String, bar: &str, held: bool) {
+fn verdict(what: &str, figure: f64, bar: &str, held: bool) {
     println!(
-        "{what:<72} {figure:>9}   {bar:<21} {}",
+        "{what:<72} {figure:>9.3}   {bar:<21} {}",
         if held { "held" } else { "MISSED" }
     );
 }
@@ -178,7 +252,7 @@ fn costs(played: &Played) -> Vec<f64> {
     played
         .outcomes
         .iter()
-        .map(|one| one.processor as f64 / one.deliveries.max(1) as f64 / 1e3)
+        .map(|one| one.processor() as f64 / one.deliveries.max(1) as f64 / 1e3)
         .collect()
 }
 
@@ -186,7 +260,7 @@ fn costs(played: &Played) -> Vec<f64> {
 fn net(played: &Played) -> f64 {
     let rounds = played.outcomes.iter().zip(&played.rests);
     let net = rounds.map(|(one, rest)| {
-        (one.processor as f64 - rest * one.seconds) / one.deliveries.max(1) as f64 / 1e3
+        (one.processor() as f64 - rest * one.seconds) / one.deliveries.max(1) as f64 / 1e3
     });
     median(net.collect())
 }

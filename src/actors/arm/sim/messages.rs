@@ -5,7 +5,7 @@
 use actix::prelude::*;
 
 use crate::actors::node::{Barrier, TopicMessage, Working};
-use crate::live::{ArmListener, GoalOrder, GoalProgress, Pose, Tracking};
+use crate::live::{ArmListener, GoalOrder, GoalProgress, MoveSetpoint, Pose, Tracking};
 use crate::math::kinematics::Unreachable;
 use crate::math::pid::Setpoint;
 use crate::math::simulation::Simulation;
@@ -106,15 +106,9 @@ pub struct SetSetpoint<const N: usize> {
     pub working: Option<Working>,
 }
 
-/// Moves the setpoint, if it is still the sender's last one. If not, the answer is the number of resets of the arm. From
-/// `joint_trajectory_controller`.
-#[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "Result<(), u64>")]
-pub struct MoveSetpoint<const N: usize> {
-    /// The sender's last setpoint.
-    pub from: Setpoint<N>,
-    /// The next one.
-    pub to: Setpoint<N>,
+/// From `joint_trajectory_controller`.
+impl<const N: usize> Message for MoveSetpoint<N> {
+    type Result = Result<(), u64>;
 }
 
 /// An effort to be applied from the next step on. From clients, by `/effort_controller/commands`.

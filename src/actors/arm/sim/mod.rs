@@ -13,20 +13,20 @@ mod turn;
 mod world;
 
 pub use self::messages::{
-    ArmPose, ArmSettings, AttachNodes, CommandEffort, CommandGoal, EndGoal, HeldLimit,
-    MoveSetpoint, SetListener, SetSetpoint, SimulationTime, TakeSnapshot, TrackGoal,
+    ArmPose, ArmSettings, AttachNodes, CommandEffort, CommandGoal, EndGoal, HeldLimit, SetListener,
+    SetSetpoint, SimulationTime, TakeSnapshot, TrackGoal,
 };
 pub use self::node::ArmSim;
 pub use self::orders::ArmOrder;
 pub use self::turn::{TURN, TURN_MESSAGES};
 pub use crate::live::{
-    ArmEvent, ArmListener, GoalOrder, GoalProgress, LEAST_PAUSE, Obstacle, PUBLISH_RATE, Pose,
-    REST_TICKS, STEP_PAUSE, StepEvent, Tracking, WAKE_UP_BUDGET,
+    ArmEvent, ArmListener, GoalOrder, GoalProgress, LEAST_PAUSE, MoveSetpoint, Obstacle,
+    PUBLISH_RATE, Pose, REST_TICKS, STEP_PAUSE, StepEvent, Tracking, WAKE_UP_BUDGET,
 };
+pub use crate::services::Echo;
 pub use crate::services::arm::{
     Disturb, Enable, Integrator, MAX_STEPS, Pause, PeriodInForce, Push, Reset, STEPS_IN_A_ROW,
     SensorsInForce, SetFriction, SetGains, SetIntegrator, SetLimits, SetParams, SetPeriod,
     SetSensors, SetState, Step, Stepped, StepsEnd, joint_names,
 };
 pub use crate::services::study::Present;
-pub use crate::services::{Echo, FieldByField};

@@ -108,54 +108,7 @@ impl<const N: usize> ArmSim<N> {
         self.arm.set_period(period);
         self
     }
-}
 
-// ---- life cycle -----------------------------------------------------------------------------------------------------
-
-impl<const N: usize> Actor for ArmSim<N> {
-    type Context = Context<Self>;
-
-    fn started(&mut self, ctx: &mut Context<Self>) {
-        self.arm.world.epoch = Instant::now();
-        self.arm.restart_pacer();
-        self.schedule_tick(ctx);
-    }
-}
-
-// ---- handlers -------------------------------------------------------------------------------------------------------
-
-impl<const N: usize> Handler<Interest> for ArmSim<N> {
-    type Result = ();
-
-    fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
-        self.count_message(ctx);
-        self.arm.set_wanted(interest.topic, interest.wanted);
-        self.end_rest(ctx);
-        self.ask_limit(ctx);
-    }
-}
-
-impl<const N: usize> Handler<ArmSettings<N>> for ArmSim<N> {
-    type Result = MessageResult<ArmSettings<N>>;
-
-    fn handle(&mut self, _: ArmSettings<N>, ctx: &mut Context<Self>) -> Self::Result {
-        self.count_message(ctx);
-        MessageResult(self.arm.present())
-    }
-}
-
-impl<const N: usize> Handler<AttachNodes<N>> for ArmSim<N> {
-    type Result = ();
-
-    fn handle(&mut self, nodes: AttachNodes<N>, _: &mut Context<Self>) {
-        self.study = nodes.study.or(self.study.take());
-        self.goal_reporters.extend(nodes.goal_reporters);
-    }
-}
-
-// ---- helpers --------------------------------------------------------------------------------------------------------
-
-impl<const N: usize> ArmSim<N> {
     /// Wakes at the next multiple of the tick's length, or at a later one while nothing observes the arm. Missed ticks
     /// are skipped, not made up.
     fn schedule_tick(&mut self, ctx: &mut Context<Self>) {
@@ -269,6 +222,51 @@ impl<const N: usize> ArmSim<N> {
         }));
     }
 }
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Actor for ArmSim<N> {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        self.arm.world.epoch = Instant::now();
+        self.arm.restart_pacer();
+        self.schedule_tick(ctx);
+    }
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Handler<Interest> for ArmSim<N> {
+    type Result = ();
+
+    fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
+        self.count_message(ctx);
+        self.arm.set_wanted(interest.topic, interest.wanted);
+        self.end_rest(ctx);
+        self.ask_limit(ctx);
+    }
+}
+
+impl<const N: usize> Handler<ArmSettings<N>> for ArmSim<N> {
+    type Result = MessageResult<ArmSettings<N>>;
+
+    fn handle(&mut self, _: ArmSettings<N>, ctx: &mut Context<Self>) -> Self::Result {
+        self.count_message(ctx);
+        MessageResult(self.arm.present())
+    }
+}
+
+impl<const N: usize> Handler<AttachNodes<N>> for ArmSim<N> {
+    type Result = ();
+
+    fn handle(&mut self, nodes: AttachNodes<N>, _: &mut Context<Self>) {
+        self.study = nodes.study.or(self.study.take());
+        self.goal_reporters.extend(nodes.goal_reporters);
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
 
 /// Sends a barrier to each of these actors, and waits until all have answered.
 pub(super) fn pass_barriers(reporters: &[Recipient<Barrier>]) -> impl Future<Output = ()> + use<> {

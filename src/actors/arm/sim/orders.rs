@@ -7,12 +7,12 @@
 use actix::prelude::*;
 
 use super::messages::{
-    ArmPose, CommandEffort, CommandGoal, EndGoal, MoveSetpoint, SetListener, SetSetpoint,
-    SimulationTime, TakeSnapshot, TrackGoal,
+    ArmPose, CommandEffort, CommandGoal, EndGoal, SetListener, SetSetpoint, SimulationTime,
+    TakeSnapshot, TrackGoal,
 };
 use super::node::ArmSim;
 use crate::actors::node::{Nodes, TopicMessage};
-use crate::live::{GoalProgress, Journal, Pose, Tracking};
+use crate::live::{GoalProgress, Journal, MoveSetpoint, Pose, Tracking};
 use crate::math::kinematics::Unreachable;
 use crate::math::simulation::{ArmInput, Simulation};
 use crate::protocol::catalog::Topic;

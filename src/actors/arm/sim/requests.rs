@@ -48,6 +48,46 @@ impl<const N: usize> ArmSim<N> {
             }
         }
     }
+
+    /// Yields to all other messages, and waits until the goal's feedback has been published. Otherwise the registry
+    /// would get it faster than it delivers it. Then the remaining requests continue, one after the other.
+    fn go_on_stepping(&mut self, ctx: &mut Context<Self>) {
+        let feedback_sent = self.feedback_sent.take();
+        self.is_stepping = feedback_sent.is_some() || !self.steps.is_empty();
+        if !self.is_stepping {
+            return;
+        }
+        let reporters = self.goal_reporters.clone();
+        let others = async move {
+            let Some(progress) = feedback_sent else {
+                return tokio::task::yield_now().await;
+            };
+            let _ = progress.await;
+            pass_barriers(&reporters).await;
+        };
+        ctx.spawn(others.into_actor(self).map(|(), arm, ctx| {
+            if let Some(next) = arm.steps.pop_front() {
+                arm.take_row(next);
+            }
+            arm.go_on_stepping(ctx);
+        }));
+    }
+
+    /// Takes the next row of steps. Answers after the last one, otherwise puts the request at the end of the queue.
+    /// Nothing is stepped for a client that has left, because another one may have reset the arm since.
+    fn take_row(&mut self, mut steps: Steps<N>) {
+        if steps.reply.caller_has_left() {
+            return steps.reply.refuse(Unserved::CALLER_GONE);
+        }
+        let (stepped, progress) = self.arm.take_row(&mut steps.asked);
+        if let (Some(progress), Some(owner)) = (progress, &self.arm.world.owner) {
+            self.feedback_sent = Some(Box::pin(owner.send(progress)));
+        }
+        match stepped {
+            Some(stepped) => steps.reply.conclude(Ok(stepped)),
+            None => self.steps.push_back(steps),
+        }
+    }
 }
 
 impl<const N: usize, A: ArmRequest<N>> Handler<Call<A>> for ArmSim<N> {
@@ -96,48 +136,6 @@ impl<const N: usize> Handler<Call<Step<N>>> for ArmSim<N> {
         self.take_row(steps);
         if !self.is_stepping {
             self.go_on_stepping(ctx);
-        }
-    }
-}
-
-impl<const N: usize> ArmSim<N> {
-    /// Yields to all other messages, and waits until the goal's feedback has been published. Otherwise the registry
-    /// would get it faster than it delivers it. Then the remaining requests continue, one after the other.
-    fn go_on_stepping(&mut self, ctx: &mut Context<Self>) {
-        let feedback_sent = self.feedback_sent.take();
-        self.is_stepping = feedback_sent.is_some() || !self.steps.is_empty();
-        if !self.is_stepping {
-            return;
-        }
-        let reporters = self.goal_reporters.clone();
-        let others = async move {
-            let Some(progress) = feedback_sent else {
-                return tokio::task::yield_now().await;
-            };
-            let _ = progress.await;
-            pass_barriers(&reporters).await;
-        };
-        ctx.spawn(others.into_actor(self).map(|(), arm, ctx| {
-            if let Some(next) = arm.steps.pop_front() {
-                arm.take_row(next);
-            }
-            arm.go_on_stepping(ctx);
-        }));
-    }
-
-    /// Takes the next row of steps. Answers after the last one, otherwise puts the request at the end of the queue.
-    /// Nothing is stepped for a client that has left, because another one may have reset the arm since.
-    fn take_row(&mut self, mut steps: Steps<N>) {
-        if steps.reply.caller_has_left() {
-            return steps.reply.refuse(Unserved::CALLER_GONE);
-        }
-        let (stepped, progress) = self.arm.take_row(&mut steps.asked);
-        if let (Some(progress), Some(owner)) = (progress, &self.arm.world.owner) {
-            self.feedback_sent = Some(Box::pin(owner.send(progress)));
-        }
-        match stepped {
-            Some(stepped) => steps.reply.conclude(Ok(stepped)),
-            None => self.steps.push_back(steps),
         }
     }
 }

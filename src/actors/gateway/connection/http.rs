@@ -74,8 +74,8 @@ impl ClientSession {
             session: self,
             client: RefCell::new(Some(client)),
         };
-        let site = (&self.admission.site, self.ends.local);
-        let served = serve::serve(stream, first, due, site, &gate, gate.evicted());
+        let (site, local) = (&self.admission.site, self.ends.local);
+        let served = serve::serve(stream, first, due, site, local, &gate, gate.evicted());
         let (stream, behind) = served.await?;
         let place = gate.client.into_inner()?.ok()?;
         let quiet = Request {

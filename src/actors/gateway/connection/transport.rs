@@ -287,14 +287,14 @@ pub(super) fn write_some<'a, S: AsyncWrite + Unpin, B: Deref<Target = [u8]> + 'a
         ready!(stream.poll_write(cx, offered))?
     } else {
         let mut slices = [IoSlice::new(&[]); WRITE_FRAMES];
-        let mut room = WRITE_BYTES;
+        let mut left = WRITE_BYTES;
         let mut count = 0;
         for (slice, frame) in slices.iter_mut().zip(frames) {
-            let offered = frame.len().min(room);
+            let offered = frame.len().min(left);
             *slice = IoSlice::new(frame.get(..offered).unwrap_or_default());
             count += 1;
-            room -= offered;
-            if room == 0 {
+            left -= offered;
+            if left == 0 {
                 break;
             }
         }

@@ -221,7 +221,7 @@ impl Registry {
         if server.is_some_and(Client::is_congested) {
             return Err(Refusal::ProviderBusy(name.to_owned()));
         }
-        if server.is_some_and(|server| !server.has_long_room(args.get().len())) {
+        if server.is_some_and(|server| !server.may_wait(args.get().len())) {
             return Err(Refusal::ProviderFull(name.to_owned()));
         }
         let Some(caller) = self.clients.get(&origin.from) else {
@@ -281,7 +281,7 @@ impl Registry {
             return Ok(());
         }
         let answer = encode(&request.name, request.id.as_ref());
-        if !caller.has_long_room(answer.len()) {
+        if !caller.may_wait(answer.len()) {
             self.fail(&request, &Refusal::CallerFull(name()));
             return Ok(());
         }

@@ -75,13 +75,13 @@ impl Client {
 
     /// Sends a forwarded call or another client's response, which counts for `MAX_LONG_BACKLOG` if it is long.
     pub(super) fn send_long(&self, frame: Bytes) {
-        let permit = self.long_room.try_take(frame.len());
+        let permit = self.long_backlog.try_take(frame.len());
         self.send(cover(permit.as_ref(), frame));
     }
 
     /// Whether a forwarded call or another client's response of this length may wait for it.
-    pub(super) fn has_long_room(&self, bytes: usize) -> bool {
-        bytes <= SHORT || self.long_room.has(bytes)
+    pub(super) fn may_wait(&self, bytes: usize) -> bool {
+        bytes <= SHORT || self.long_backlog.has(bytes)
     }
 
     /// Sends a response. `service` is the responding service, if it is the runtime's own.
@@ -137,7 +137,7 @@ impl Handler<Connect> for Registry {
             from: connect.from,
             entries: EntrySum::default(),
             registered: Registrations::default(),
-            long_room: Pool::of(MAX_LONG_BACKLOG),
+            long_backlog: Pool::of(MAX_LONG_BACKLOG),
             withdrawn: HashSet::new(),
             verbosity: Verbosity::ALL,
             error_form: ErrorForm::default(),

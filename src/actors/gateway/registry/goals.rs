@@ -188,8 +188,8 @@ impl Registry {
         };
         let spelling = &*provider.spelling;
         let length = messages::cancellation(spelling, &names::own_id(u64::MAX)).len();
-        let room = MAX_BACKLOG.saturating_sub(server.backlog()) / length;
-        let (ids, is_rest) = self.requests.cancel_all(action, provider.connection, room);
+        let most = MAX_BACKLOG.saturating_sub(server.backlog()) / length;
+        let (ids, is_rest) = self.requests.cancel_all(action, provider.connection, most);
         for id in &ids {
             server.send(messages::cancellation(spelling, id));
         }

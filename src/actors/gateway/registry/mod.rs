@@ -82,7 +82,7 @@ struct Client {
     entries: EntrySum,
     registered: Registrations,
     /// The memory of long calls and answers of other clients that wait for it.
-    long_room: Pool,
+    long_backlog: Pool,
     /// Topics of the runtime's subscriptions that this client has explicitly unadvertised. Its messages there are
     /// dropped until it advertises again.
     withdrawn: HashSet<Topic>,
@@ -119,47 +119,7 @@ impl Registry {
         let places = Places::of(clients);
         Self { places, ..self }
     }
-}
 
-// ---- handlers -------------------------------------------------------------------------------------------------------
-
-impl Actor for Registry {
-    type Context = Context<Self>;
-
-    fn started(&mut self, ctx: &mut Context<Self>) {
-        Self::start_cleanup(ctx);
-    }
-}
-
-impl Handler<Request> for Registry {
-    type Result = Completion;
-
-    fn handle(&mut self, request: Request, ctx: &mut Context<Self>) -> Completion {
-        let Request { from, incoming, .. } = request;
-        if !self.clients.contains_key(&from) {
-            return Completion::at_once();
-        }
-        let Incoming { id, op } = incoming;
-        let origin = FrameOrigin { from, id };
-        self.permit = request.permit;
-        let completion = match op {
-            Ok(op) => self.perform(origin, op, ctx),
-            Err(why) => {
-                self.answer_error(&origin, &why);
-                Completion::at_once()
-            }
-        };
-        let permit = self.permit.take();
-        if let Some(permit) = permit.filter(|_| completion.is_at_once()) {
-            permit.trim();
-        }
-        completion
-    }
-}
-
-// ---- ops ------------------------------------------------------------------------------------------------------------
-
-impl Registry {
     /// Performs one op of a registered client.
     fn perform(&mut self, origin: FrameOrigin, op: Op, ctx: &mut Context<Self>) -> Completion {
         let refusal = match op {
@@ -201,6 +161,42 @@ impl Registry {
             self.refuse(&origin, &why);
         }
         Completion::at_once()
+    }
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl Actor for Registry {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        Self::start_cleanup(ctx);
+    }
+}
+
+impl Handler<Request> for Registry {
+    type Result = Completion;
+
+    fn handle(&mut self, request: Request, ctx: &mut Context<Self>) -> Completion {
+        let Request { from, incoming, .. } = request;
+        if !self.clients.contains_key(&from) {
+            return Completion::at_once();
+        }
+        let Incoming { id, op } = incoming;
+        let origin = FrameOrigin { from, id };
+        self.permit = request.permit;
+        let completion = match op {
+            Ok(op) => self.perform(origin, op, ctx),
+            Err(why) => {
+                self.answer_error(&origin, &why);
+                Completion::at_once()
+            }
+        };
+        let permit = self.permit.take();
+        if let Some(permit) = permit.filter(|_| completion.is_at_once()) {
+            permit.trim();
+        }
+        completion
     }
 }
 

@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 use tokio::time::Instant;
 
 use crate::actors::arm::sim::{ArmPose, Pose};
-use crate::actors::node::{ActionClient, Ask, Call, CancelSent, ForwardGoal, Publish, ShutDown};
+use crate::actors::node::{ActionClient, Call, CancelSent, ForwardGoal, Publish, ShutDown};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::scene::{TfMessage, seen_from};
 use crate::protocol::messages::{Empty, Header, Stamp};
@@ -45,10 +45,6 @@ const NOT_KEPT: &str = "id must be that of a goal of this connection";
 /// Requests the name of the topic with the frames. From clients, by `/republish_tfs`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RepublishTfs;
-
-impl Ask for RepublishTfs {
-    type Answer = ();
-}
 
 /// A client's request for frames of an arm of `N` links.
 pub struct FrameGoal<const N: usize> {
@@ -102,6 +98,58 @@ impl<const N: usize> TfRepublisher<N> {
             publish,
             requests: Vec::new(),
             timer: None,
+        }
+    }
+
+    fn end_those(&mut self, status: GoalStatus, is_meant: impl Fn(&FrameRequest<N>) -> bool) {
+        for request in self.requests.extract_if(.., |request| is_meant(request)) {
+            request.end(status, None);
+        }
+    }
+
+    /// Requests the arm's pose, and sends the due messages. Stops when there are no requests.
+    fn send_on_timer(&mut self, ctx: &mut Context<Self>) {
+        self.requests.retain(|request| !request.is_gone());
+        if self.requests.is_empty() {
+            if let Some(timer) = self.timer.take() {
+                ctx.cancel_future(timer);
+            }
+            return;
+        }
+        let asked = self.arm.send(ArmPose).into_actor(self);
+        ctx.wait(asked.map(|pose, node, _| {
+            if let Ok(pose) = pose {
+                node.send_due(&pose);
+            }
+        }));
+    }
+
+    /// Sends the messages that are due at this pose of the arm.
+    fn send_due(&mut self, pose: &Pose<N>) {
+        let (now, stamp) = (Instant::now(), Stamp::from_seconds(pose.time));
+        // A message is sent at the nearest tick: the next tick would be later than this one is early.
+        let latest = now + PERIOD / 2;
+        let due = self
+            .requests
+            .iter_mut()
+            .filter(|request| request.due <= latest);
+        let mut due: Vec<_> = due.collect();
+        // The longest overdue are first.
+        due.sort_by_key(|request| request.due);
+        for (order, FrameRequest { goal, client, due }) in (0..).zip(due.into_iter().take(AT_ONCE))
+        {
+            // A delay of up to a period is made up. A nanosecond keeps the order, so requests that are always due take turns.
+            *due = (*due + goal.period).max(now + Duration::from_nanos(order));
+            let sources = goal.sources.iter().map(String::as_str);
+            let (lengths, positions) = (&pose.lengths, &pose.state.position);
+            let message = seen_from(stamp, &goal.target, sources, lengths, positions);
+            if let Some(PublishedGoal { id, .. }) = &goal.published {
+                let message = published(stamp, id, &message);
+                self.publish
+                    .do_send(Publish::made(Topic::TfWebFeedback, move || message));
+            } else {
+                client.feed_back(message);
+            }
         }
     }
 }
@@ -197,60 +245,6 @@ impl<const N: usize> FrameRequest<N> {
         match &self.goal.published {
             Some(published) => published.listening.strong_count() == 0,
             None => self.client.link.is_gone(),
-        }
-    }
-}
-
-impl<const N: usize> TfRepublisher<N> {
-    fn end_those(&mut self, status: GoalStatus, is_meant: impl Fn(&FrameRequest<N>) -> bool) {
-        for request in self.requests.extract_if(.., |request| is_meant(request)) {
-            request.end(status, None);
-        }
-    }
-
-    /// Requests the arm's pose, and sends the due messages. Stops when there are no requests.
-    fn send_on_timer(&mut self, ctx: &mut Context<Self>) {
-        self.requests.retain(|request| !request.is_gone());
-        if self.requests.is_empty() {
-            if let Some(timer) = self.timer.take() {
-                ctx.cancel_future(timer);
-            }
-            return;
-        }
-        let asked = self.arm.send(ArmPose).into_actor(self);
-        ctx.wait(asked.map(|pose, node, _| {
-            if let Ok(pose) = pose {
-                node.send_due(&pose);
-            }
-        }));
-    }
-
-    /// Sends the messages that are due at this pose of the arm.
-    fn send_due(&mut self, pose: &Pose<N>) {
-        let (now, stamp) = (Instant::now(), Stamp::from_seconds(pose.time));
-        // A message is sent at the nearest tick: the next tick would be later than this one is early.
-        let latest = now + PERIOD / 2;
-        let due = self
-            .requests
-            .iter_mut()
-            .filter(|request| request.due <= latest);
-        let mut due: Vec<_> = due.collect();
-        // The longest overdue are first.
-        due.sort_by_key(|request| request.due);
-        for (order, FrameRequest { goal, client, due }) in (0..).zip(due.into_iter().take(AT_ONCE))
-        {
-            // A delay of up to a period is made up. A nanosecond keeps the order, so requests that are always due take turns.
-            *due = (*due + goal.period).max(now + Duration::from_nanos(order));
-            let sources = goal.sources.iter().map(String::as_str);
-            let (lengths, positions) = (&pose.lengths, &pose.state.position);
-            let message = seen_from(stamp, &goal.target, sources, lengths, positions);
-            if let Some(PublishedGoal { id, .. }) = &goal.published {
-                let message = published(stamp, id, &message);
-                self.publish
-                    .do_send(Publish::made(Topic::TfWebFeedback, move || message));
-            } else {
-                client.feed_back(message);
-            }
         }
     }
 }

@@ -10,9 +10,7 @@ use bytes::Bytes;
 use serde_json::json;
 
 use super::{CancelPublished, FrameGoal, MAX_FRAMES, PublishedGoal, RepublishTfs, TfRepublisher};
-use crate::actors::node::{
-    ActionClient, Address, Answered, Callable, ForwardGoal, Goal, Nodes, TopicMessage,
-};
+use crate::actors::node::{ActionClient, Address, Ask, ForwardGoal, Nodes, SentGoal, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::scene::{WORLD, is_frame};
@@ -54,7 +52,9 @@ impl<const N: usize> TfRepublisher<N> {
 
 // ---- the service ----------------------------------------------------------------------------------------------------
 
-impl Callable for RepublishTfs {
+impl Ask for RepublishTfs {
+    type Answer = ();
+
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let target = fields.text("target_frame");
@@ -72,9 +72,7 @@ impl Callable for RepublishTfs {
         check_thresholds(&mut fields);
         fields.accept(Self)
     }
-}
 
-impl Answered for RepublishTfs {
     fn write((): (), to: &Address) -> Bytes {
         to.response(&json!({"topic_name": Topic::TfWeb.name()}), "")
     }
@@ -89,7 +87,7 @@ fn check_thresholds(fields: &mut Fields<'_>) {
 
 // ---- the action -----------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Goal for FrameGoal<N> {
+impl<const N: usize> SentGoal for FrameGoal<N> {
     const ACTION: Action = Action::TfSubscription;
 
     fn read(arguments: &Arguments) -> Result<Self, Rejections> {

@@ -12,7 +12,7 @@ use mio::net::TcpStream;
 use mio::{Events, Interest, Poll, Token};
 
 use crate::message::Template;
-use pendularm_benches::program::{processor, resident};
+use pendularm_benches::program::{ThreadWork, resident, threads, threads_since};
 use pendularm_benches::protocol::Protocol;
 
 /// Longest wait for a server. After that the run fails.
@@ -45,6 +45,13 @@ pub struct Scene {
     pub traffic: Traffic,
 }
 
+impl Outcome {
+    /// Processor time of the server while it was measured \[ns\].
+    pub fn processor(&self) -> u64 {
+        self.threads.iter().map(|one| one.processor).sum()
+    }
+}
+
 impl Scene {
     /// A scene of one topic.
     pub const fn new(name: &'static str, traffic: Traffic, subscribers: usize) -> Self {
@@ -66,8 +73,8 @@ impl Scene {
 pub struct Outcome {
     pub seconds: f64,
     pub deliveries: u64,
-    /// Processor time of the server while it was measured \[ns\].
-    pub processor: u64,
+    /// The work of the server's threads while it was measured.
+    pub threads: Vec<ThreadWork>,
     /// Time from the creation of each message to its reading \[ns\]. None if the arm publishes.
     pub latencies: Vec<u32>,
     /// Resident memory of the server at the end \[MB\].
@@ -206,18 +213,18 @@ impl Fleet {
     /// Runs the scene for `seconds` after a warm-up, then waits for all sent messages.
     pub fn run(mut self, pid: u32, seconds: f64) -> Outcome {
         let began = Instant::now();
-        let (mut measured_from, mut at_start, mut before) = (None, 0, 0);
+        let (mut measured_from, mut at_start, mut before) = (None, Vec::new(), 0);
         let mut next = began;
         let (wall, deliveries, used) = loop {
             let now = Instant::now();
             match measured_from {
                 None if now >= began + WARM_UP => {
                     (measured_from, before) = (Some(now), self.deliveries);
-                    at_start = processor(pid);
+                    at_start = threads(pid);
                     self.measuring = true;
                 }
                 Some(from) if now >= from + Duration::from_secs_f64(seconds) => {
-                    let used = processor(pid) - at_start;
+                    let used = threads_since(pid, &at_start);
                     break (now - from, self.deliveries - before, used);
                 }
                 _ => {}
@@ -230,7 +237,7 @@ impl Fleet {
         Outcome {
             seconds: wall.as_secs_f64(),
             deliveries,
-            processor: used,
+            threads: used,
             latencies: std::mem::take(&mut self.latencies),
             resident: resident(pid),
         }
