@@ -33,7 +33,7 @@ use serde_json::{Value, json};
 
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
-use crate::services::Callable as _;
+use crate::services::Ask as _;
 use crate::services::study::AnalyseMethod;
 use crate::study::tableau::Pair;
 
