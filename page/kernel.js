@@ -1,7 +1,9 @@
 // The arm in this page: its kernel runs in a worker, behind the interface of a WebSocket. If workers are forbidden, it runs in the page's own thread.
 // Invariant: for its callers it behaves like a WebSocket to the runtime.
 
-/** The kernel, as gzip in base64, in the page in one file. A server's page has none. */
+import { unpack } from "./packed.js";
+
+/** The packed kernel in the page in one file. A server's page has none. */
 const carried = document.querySelector("#kernel-module");
 /** Whether the arm is in this page. */
 export const isAlone = carried !== null;
@@ -13,13 +15,6 @@ const LINKS = /(?:^|[?#&])links=([23])(?:&|$)/;
 export function linksIn(part) {
   const found = LINKS.exec(part);
   return found && Number(found[1]);
-}
-
-/** @param {string} text base64 of gzip */
-export async function unpack(text) {
-  const packed = Uint8Array.from(atob(text), (one) => one.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Response(stream).arrayBuffer();
 }
 
 /**

@@ -282,6 +282,8 @@ export const trialStop = () => bridge.call("/ik_trial/stop");
 
 /** Gains for an arm. @param {import("./question.js").Question} question */
 export const suggestGains = (question) => bridge.call("/study/gains", gainsArgs(question), LONG_CALL_MS);
+/** Limits of any robot. @param {Record<string, any>} args */
+export const heldLimit = (args) => bridge.call("/study/held_limit", args, LONG_CALL_MS);
 /** An offline motion. @param {import("./question.js").Question} question @param {import("./question.js").Run} run */
 export const rollout = (question, run) => bridge.call("/study/rollout", rolloutArgs(question, run), LONG_CALL_MS);
 /** Limits of a loop. @param {import("./question.js").Question} question */

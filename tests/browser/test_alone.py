@@ -52,7 +52,7 @@ class AloneTest(PageTest):
         self.assertEqual(page.complaints, [])
 
     def test_the_kernel_has_the_bits_of_the_native_program(self):
-        ours = self.page.run("""pendularm["kernel.js"].unpack(document.querySelector("#kernel-module").textContent)
+        ours = self.page.run("""pendularm["packed.js"].unpack(document.querySelector("#kernel-module").textContent)
             .then((bytes) => WebAssembly.instantiate(bytes, { env: { milliseconds: () => performance.now() } }))
             .then(({ instance: { exports } }) => { const length = exports.compare(); return new TextDecoder().decode(new Uint8Array(exports.memory.buffer,
                 exports.output(), length)); })""")
