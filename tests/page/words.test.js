@@ -146,7 +146,7 @@ test("a request with a number that is not finite is refused, because null can me
 test("each link of the worksheets sets everything", () => {
   const text = readFileSync(new URL("../../course/worksheets.md", import.meta.url), "utf8");
   const links = [...text.matchAll(/\(\.\.\/pendularm\.html(#[^)]*)\)/g)].map(([, hash]) => hash);
-  assert.equal(links.length, 6);
+  assert.equal(links.length, 8);
   for (const link of links) {
     const settings = fromFragment(link);
     for (const [key, wanted] of Object.entries(DEFAULTS[2])) {
