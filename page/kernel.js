@@ -18,6 +18,19 @@ export function linksIn(part) {
 }
 
 /**
+ * Recomputes a submission of an episode, apart from the running kernel: the verdict in words and, if it agrees, the poses [rad] after
+ * each step and the target [m]. @param {ArrayBuffer} submission @returns {Promise<[string, number[][]?, number[]?]>}
+ */
+export async function score(submission) {
+  const { instance } = await WebAssembly.instantiate(await unpack(carried?.textContent ?? ""), { env: { milliseconds: () => 0 } });
+  const kernel = /** @type {any} */ (instance.exports);
+  const place = kernel.input(submission.byteLength);
+  new Uint8Array(kernel.memory.buffer, place, submission.byteLength).set(new Uint8Array(submission));
+  const length = kernel.score();
+  return JSON.parse(new TextDecoder().decode(new Uint8Array(kernel.memory.buffer, kernel.output(), length)));
+}
+
+/**
  * Starts the kernel, and returns the function that takes frames. Its text is also the worker's script, so it uses
  * nothing outside. @param {BufferSource} bytes @param {number} links @param {number} seed @param {(frame: string) =>
  * void} tell

@@ -269,7 +269,13 @@ function keep(key, value) {
 }
 
 const changing = (/** @type {string} */ group) => (/** @type {Record<string, any>} */ args) => change(group, args);
-export const [setParams, setGains, setIntegrator, setPeriod, setFriction, setMotors, setSensors] = GROUPS.map(changing);
+export const setParams = changing("params");
+export const setGains = changing("gains");
+export const setIntegrator = changing("integrator");
+export const setPeriod = changing("period");
+export const setFriction = changing("friction");
+export const setMotors = changing("motors");
+export const setSensors = changing("sensors");
 export const disturb = (effort, seconds) => bridge.call("/arm_sim/disturb", { effort, duration: seconds });
 export const solve = (target) => bridge.call("/ik/solve", target);
 export const cancelGoal = () => bridge.call("/ik_action/cancel_goal");
