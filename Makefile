@@ -63,6 +63,8 @@ test-page: node_modules page ## Check the page's types, test its logic without a
 	node --test tests/page/
 	$(CARGO) run --locked --quiet --package pendularm-wasm --example runs > "$(TARGET_DIR)/runs.txt"
 	node tests/page/runs.mjs "$(TARGET_DIR)/runs.txt" pendularm.html
+	$(CARGO) build --locked --quiet
+	node tests/page/scores.mjs "$(TARGET_DIR)/debug/pendularm" pendularm.html tests/data/submissions.jsonl
 
 site: ## Write the files of the public pages to OUT=site: the page, the lessons, the kept report, the library's documentation; needs python3 and a network the first time
 	@echo "make site: $(or $(OUT),site)"

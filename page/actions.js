@@ -3,7 +3,7 @@
 
 import { announce, byId, passFocus, warn } from "./dom.js";
 import { inPageNames } from "./format.js";
-import { enable, pause, reset, sendSetpoint, setFriction, setGains, setIntegrator, setMotors, setParams, setPeriod, setSensors, setState } from "./runtime.js";
+import { change, enable, GROUPS, pause, reset, sendSetpoint, setIntegrator, setState } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
 import { state, tell, watch } from "./store.js";
 
@@ -32,7 +32,7 @@ export function startActions() {
     undo.past.length = 0;
     showUndo();
   });
-  watch(["connection", "integrator", "params", "gains", "period", "friction", "motors", "sensors", "enabled", "setpoint"], showUndo);
+  watch(["connection", ...GROUPS, "enabled", "setpoint"], showUndo);
 }
 
 /** Announces the refusals, or that there are none. @param {string} refused @param {string} done */
@@ -49,20 +49,21 @@ export async function takeBack() {
   report(await apply(settings), "Undone.");
 }
 
-/** Applies the given settings, and returns the text of all refusals. The controller is last, so it never acts with half of the settings. */
-export async function apply(/** @type {import("./settings.js").Settings} */ settings) {
-  const { integrator, params, gains, period, friction, motors, sensors, controller, setpoint, start } = settings;
+/** Settings that an older server does not have. */
+const LATE = ["friction", "motors", "sensors"];
+
+/**
+ * Applies the given settings, and returns the text of all refusals. The controller is last, so it never acts with half of the settings.
+ * @param {Partial<import("./settings.js").Settings>} settings
+ */
+export async function apply({ controller, setpoint, start, ...groups }) {
   applying = true;
   tell("anew");
   const answers = [];
   if (controller === false) answers.push(await enable(false));
-  if (params) answers.push(await setParams(params));
-  if (gains) answers.push(await setGains(gains));
-  if (integrator) answers.push(await setIntegrator(integrator));
-  if (period) answers.push(await setPeriod(period));
-  if (friction && state.friction) answers.push(await setFriction(friction));
-  if (motors && state.motors) answers.push(await setMotors(motors));
-  if (sensors && state.sensors) answers.push(await setSensors(sensors));
+  for (const group of GROUPS) {
+    if (groups[group] && (state[group] || !LATE.includes(group))) answers.push(await change(group, groups[group]));
+  }
   if (setpoint) answers.push(setSetpoint(setpoint));
   if (start) answers.push(await setState(start.position ?? new Array(state.links).fill(0), start.velocity));
   if (controller != null && controller !== false) answers.push(await enable(controller));
@@ -90,10 +91,10 @@ function textOf(answers) {
  */
 export async function setScene({ controller, setpoint, ...rest }, paused) {
   await enable(false);
-  const early = await apply({ ...rest, controller: null, setpoint: null });
+  const early = await apply(rest);
   const answer = await reset();
   // A reset changes the setpoint to the starting pose, so the setpoint is sent after it.
-  const late = await apply({ integrator: null, params: null, gains: null, period: null, friction: null, motors: null, sensors: null, controller, setpoint });
+  const late = await apply({ controller, setpoint });
   if (state.paused !== paused) await pause(paused);
   return [early, late, textOf([answer])].filter(Boolean).join("; ");
 }

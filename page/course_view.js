@@ -11,6 +11,7 @@ import { announce, byId, el, goToAddress, keepChoice, passFocus, remembered, set
 import { busy, numberField } from "./field.js";
 import { duration, fixed, inPageNames, METHODS, multipleOf, partOf, seconds, shortName, significant } from "./format.js";
 import { ENERGY, newest, record, recorded, VELOCITY } from "./history.js";
+import { robotForm } from "./held_limit.js";
 import { moveOf } from "./ladder.js";
 import { drawLadder, keyOf, presentMove } from "./ladder_panel.js";
 import { isAlone, linksIn } from "./kernel.js";
@@ -322,7 +323,10 @@ function fillExtra(one) {
   if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure",
     onclick: ({ target }) => busy(target, "Measuring…", measure) }, "Measure"));
   if (one.chart === "pictures") place.append(gallery(state.links));
-  if (one.chart === "form") showForm(place, () => { now.seen.sheet = true; look(); });
+  if (one.chart === "form") {
+    showForm(place, () => { now.seen.sheet = true; look(); });
+    place.append(robotForm());
+  }
 }
 
 /** The effort limit, and what the integral does at it. */

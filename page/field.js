@@ -10,6 +10,8 @@ const SLIDER_STEPS = 400;
 const SEND_MS = 70;
 /** Digits by which two values are compared. The conversion of units changes the last ones. */
 const DIGITS = 12;
+/** A longer choice needs a row of its own [characters]. */
+const LONG = 20;
 let nextId = 1;
 
 /** The place for a refusal or a note, shown until its cause is gone. `describes` are its controls. */
@@ -68,9 +70,9 @@ export function panel(place, options, buttons, ...last) {
   return { ...said, buttons: made };
 }
 
-/** A refusal without the refused figures, which are in seconds and therefore not the typed ones. @param {string} status */
+/** A refusal without the figures of a time, which are in seconds and therefore not the typed ones. @param {string} status */
 export function withoutFigure(status) {
-  return status.replace(/, got [^,;]*(?=;|$)/g, "");
+  return status.replace(/((?:timestep|period|duration)\b[^;]*?), got [^,;]*(?=;|$)/g, "$1");
 }
 
 /**
@@ -185,14 +187,15 @@ export function numberField({ label, short = label, unit, low, high, log = false
 
 /**
  * A number for a later request: nothing is sent when it changes. An empty field is omitted. With `choices`, values and
- * their texts, one of them is chosen instead. @param {{label: string, unit?: string, value?: string | number,
- * placeholder?: string, choices?: [string, string][]}} options
+ * their texts, one of them is chosen instead. With `rows` it is a text of so many rows. @param {{label: string, unit?: string,
+ * value?: string | number, placeholder?: string, choices?: [string, string][], rows?: number}} options
  */
-export function option({ label, unit = "", value = "", placeholder = "", choices = [] }) {
+export function option({ label, unit = "", value = "", placeholder = "", choices = [], rows = 0 }) {
   const input = choices.length > 0 ? el("select", {}, ...choices.map(([name, text]) => el("option", { value: name }, text)))
+    : rows > 0 ? el("textarea", { rows, spellcheck: "false", autocomplete: "off" })
     : el("input", { type: "number", step: "any", inputmode: "decimal", autocomplete: "off", value, placeholder });
   return {
-    element: el("label", { class: "option" }, el("span", {}, label),
+    element: el("label", { class: rows > 0 || choices.some(([, text]) => text.length > LONG) ? "option wide" : "option" }, el("span", {}, label),
       el("span", { class: "with-unit" }, input, ...(unit ? [el("span", { class: "unit" }, unit)] : []))),
     input,
     /** `undefined` if the field is empty, NaN if its text is no number. */

@@ -45,11 +45,13 @@ export function duration(seconds) {
 /** @type {Record<string, string>} */
 const SINGULAR = { masses: "mass", lengths: "length" };
 /** Fields with another name on the page. @type {Record<string, string>} */
-const SHOWN = { data: "controller", effort: "torque", epsilon: "tolerance", period: "control period", phi: "orientation", success_hold: "hold" };
+const SHOWN = { data: "controller", effort: "torque", epsilon: "tolerance", period: "control period", phi: "orientation", success_hold: "hold",
+  mass_matrix: "M" };
 
 /** A refusal with the page's names: "mass 1 must be a number", not "params.masses[0] must be a number, got null". @param {string} status */
 export function inPageNames(status) {
-  return status.replace(/\b(?:gains|params)\./g, "").replace(/\b(\w+)\[(\d)\]/g, (_, name, i) => `${SINGULAR[name] ?? name} ${Number(i) + 1}`)
+  return status.replace(/\b(?:gains|params)\./g, "").replace(/\[(\d+)\]\[(\d+)\]/g, (_, i, j) => ` at row ${Number(i) + 1}, column ${Number(j) + 1}`)
+    .replace(/\b(\w+)\[(\d+)\]/g, (_, name, i) => `${SINGULAR[name] ?? name} ${Number(i) + 1}`)
     .replace(/(^|; )(\w+)/g, (_, before, name) => before + (SHOWN[name] ?? name))
     .replace(/must be true or false/g, "must be on or off").replace(/, got null(?=;|$)/g, "");
 }

@@ -1,7 +1,9 @@
 // The arm in this page: its kernel runs in a worker, behind the interface of a WebSocket. If workers are forbidden, it runs in the page's own thread.
 // Invariant: for its callers it behaves like a WebSocket to the runtime.
 
-/** The kernel, as gzip in base64, in the page in one file. A server's page has none. */
+import { unpack } from "./packed.js";
+
+/** The packed kernel in the page in one file. A server's page has none. */
 const carried = document.querySelector("#kernel-module");
 /** Whether the arm is in this page. */
 export const isAlone = carried !== null;
@@ -15,11 +17,17 @@ export function linksIn(part) {
   return found && Number(found[1]);
 }
 
-/** @param {string} text base64 of gzip */
-export async function unpack(text) {
-  const packed = Uint8Array.from(atob(text), (one) => one.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Response(stream).arrayBuffer();
+/**
+ * Recomputes a submission of an episode, apart from the running kernel: the verdict in words and, if it agrees, the poses [rad] after
+ * each step and the target [m]. @param {ArrayBuffer} submission @returns {Promise<[string, number[][]?, number[]?]>}
+ */
+export async function score(submission) {
+  const { instance } = await WebAssembly.instantiate(await unpack(carried?.textContent ?? ""), { env: { milliseconds: () => 0 } });
+  const kernel = /** @type {any} */ (instance.exports);
+  const place = kernel.input(submission.byteLength);
+  new Uint8Array(kernel.memory.buffer, place, submission.byteLength).set(new Uint8Array(submission));
+  const length = kernel.score();
+  return JSON.parse(new TextDecoder().decode(new Uint8Array(kernel.memory.buffer, kernel.output(), length)));
 }
 
 /**

@@ -1,6 +1,6 @@
 // The arm's geometry, gravity load and energy from its state, only for drawing: the runtime computes the motion. Angles are in
 // rad, each relative to the previous link. Link i has length l[i] and mass m[i], with its centre in the middle.
-// Invariant: nothing is allocated. Results are written to the caller's arrays.
+// Invariant: what is needed for a picture allocates nothing. Its results are written to the caller's arrays.
 
 /** Ends of each link into `x`, `y`: entry 0 is the base, entry i the end of link i. */
 export function joints(n, q, l, x, y) {
@@ -29,6 +29,25 @@ export function gravityLoad(n, q, arm, load, at = 0) {
   }
 }
 
+/** The mass matrix [kg m²] and the gradient of the gravity load [N m/rad] in a pose, by rows. @param {number[]} q @param {import("./question.js").Arm} arm */
+export function linearised(q, { gravity, masses, lengths }) {
+  const angles = q.map((_, k) => reach(q.slice(0, k + 1)));
+  const beyond = masses.map((_, k) => reach(masses.slice(k + 1)));
+  /** Inertia that couples the turning of two links. */
+  const between = (/** @type {number} */ k, /** @type {number} */ l) => {
+    const outer = Math.max(k, l);
+    return lengths[k] * lengths[l] * (masses[outer] / (k === l ? 3 : 2) + beyond[outer]) * Math.cos(angles[k] - angles[l]);
+  };
+  const lift = (/** @type {number} */ k) => -gravity * lengths[k] * (masses[k] / 2 + beyond[k]) * Math.sin(angles[k]);
+  const rows = (/** @type {(i: number, j: number) => number} */ entry) => q.map((_, i) => q.map((__, j) => entry(i, j)));
+  // A joint turns its own link and all links beyond it.
+  const turned = (/** @type {number} */ i) => q.map((_, k) => k).slice(i);
+  return {
+    mass: rows((i, j) => reach(turned(i).flatMap((k) => turned(j).map((l) => between(k, l))))),
+    stiffness: rows((i, j) => reach(turned(Math.max(i, j)).map(lift))),
+  };
+}
+
 /** Kinetic and potential energy [J]. The latter is 0 in the starting pose, stretched along x. */
 export function energies(n, q, qd, { gravity, masses, lengths }) {
   let [phi, omega, y, kinetic, potential] = [0, 0, 0, 0, 0];
@@ -48,6 +67,7 @@ export function energies(n, q, qd, { gravity, masses, lengths }) {
   return { kinetic, potential };
 }
 
+/** The sum of the lengths, or of other numbers. @param {number[]} lengths */
 export function reach(lengths) {
   return lengths.reduce((sum, one) => sum + one, 0);
 }

@@ -1,7 +1,7 @@
 // Two motions of a scene beside each other: the correct one, slowly, and one that fails, with a longer timestep or another method.
 // Invariant: both are runs of the runtime, from the same start. The live arm does not change.
 
-import { links as drawLinks, STRONG, TEXT, write } from "./chart.js";
+import { circle, links as drawLinks, STRONG, TEXT, write } from "./chart.js";
 import { duration, shortName, significant } from "./format.js";
 import { endOf } from "./ladder.js";
 import { joints, reach } from "./mechanics.js";
@@ -12,7 +12,7 @@ import { colors } from "./theme.js";
 /** @typedef {import("./scenes.js").Scene} Scene */
 /** @typedef {import("./question.js").Question} Question */
 /** @typedef {{question: Question, run: import("./question.js").Run}} Wanted */
-/** @typedef {{name: string, note: string, poses: (number[] | null)[], lengths: number[], color: string}} Motion */
+/** @typedef {{name: string, note: string, poses: (number[] | null)[], lengths: number[], color: string, target?: number[]}} Motion */
 
 /** The scenes of the course, each with method and timestep [s] of the motion that fails. @type {Record<string, {method?: string, timestep: number}>} */
 export const FAILING = {
@@ -61,12 +61,14 @@ const APART = 4; // samples between them
 
 /** @param {import("./surface.js").Surface} surface @param {Motion[]} motions @param {number} part of the time, from 0 to 1 */
 export function drawMotions({ context, width, height }, motions, part) {
+  const count = Math.max(...motions.map(({ poses }) => poses.length)); // fewer are those of a run that diverged
   const half = width / motions.length;
-  motions.forEach(({ name, note, poses, lengths, color }, side) => {
+  motions.forEach(({ name, note, poses, lengths, color, target }, side) => {
     const scale = Math.min(half, height - 48) / (2.1 * reach(lengths));
     const px = (/** @type {number} */ metres) => half * (side + 0.5) + scale * metres;
     const py = (/** @type {number} */ metres) => 44 + (height - 48) / 2 - scale * metres;
-    const at = Math.min(poses.length - 1, Math.floor(part * (SAMPLES - 1)));
+    const at = Math.min(poses.length - 1, Math.floor(part * (count - 1)));
+    if (target) circle(context, px(target[0]), py(target[1]), 6, "", colors.target, 2);
     context.lineCap = context.lineJoin = "round";
     for (let k = SHADOWS; k >= 0; k -= 1) {
       const q = poses[Math.max(0, at - APART * k)];

@@ -1,4 +1,4 @@
-// A question to the study: everything on which its answer depends. Each request to a service `/study/*` is built here.
+// A question to the study: everything on which its answer depends. Each request to a service `/study/*` about the arm is built here.
 // Invariant: a question is complete, so an answer never depends on the live arm at the time of the computation.
 
 /** @typedef {{gravity: number, masses: number[], lengths: number[]}} Arm */

@@ -222,31 +222,45 @@ function goalResult(msg) {
 /** Asks for all settings. Returns the answer to the last question, after which all are known. */
 function poll() {
   if (!bridge.open || document.hidden) return undefined;
-  setParams({});
-  setIntegrator({});
-  setGains({});
-  setPeriod({});
-  setFriction({});
-  setMotors({});
-  setSensors({});
+  for (const group of GROUPS) change(group, {});
   pause();
   const last = enable();
   askStability();
   return last;
 }
 
-async function settings(service, args, keep) {
+/** The service of each group of settings, in the order in which they are set. @type {Record<string, string>} */
+const SERVICES = {
+  params: "/arm_sim/set_params", gains: "/pid_controller/set_gains", integrator: "/arm_sim/set_integrator", period: "/pid_controller/set_period",
+  friction: "/arm_sim/set_friction", motors: "/pid_controller/set_limits", sensors: "/pid_controller/set_sensors",
+};
+export const GROUPS = Object.keys(SERVICES);
+/** The delay is a value of two groups, so a change of one asks for the other. @type {Record<string, string>} */
+const OTHER = { period: "sensors", sensors: "period" };
+
+/** Changes settings of a group, or reads them without `args`. @param {string} group @param {Record<string, any>} args */
+export async function change(group, args) {
   if (Object.keys(args).length > 0) beforeChange();
-  const answer = await bridge.call(service, args);
-  if (Object.keys(answer.values).length > 0) keep(answer.values);
+  const answer = await bridge.call(SERVICES[group], args);
+  if (Object.keys(answer.values).length > 0) keep(group, answer.values);
+  if (args.delay !== undefined) await change(OTHER[group], {});
   return answer;
 }
 
-/** This is not a setting, so there is nothing to undo. */
-export async function pause(data) {
-  const answer = await bridge.call("/arm_sim/pause", data === undefined ? {} : { data });
-  if ("data" in answer.values) keep("paused", answer.values.data);
+/** Switches something on or off, or reads it. @param {string} service @param {string} key @param {boolean} [data] */
+async function flip(service, key, data) {
+  const answer = await bridge.call(service, data === undefined ? {} : { data });
+  if ("data" in answer.values) keep(key, answer.values.data);
   return answer;
+}
+
+/** This is not a setting, so there is nothing to undo. @param {boolean} [data] */
+export const pause = (data) => flip("/arm_sim/pause", "paused", data);
+
+/** Switches the controller. @param {boolean} [data] */
+export function enable(data) {
+  if (data !== undefined) beforeChange();
+  return flip("/pid_controller/enable", "enabled", data);
 }
 
 /** Stores `value` under `key`, and notifies only if it differs. */
@@ -254,23 +268,14 @@ function keep(key, value) {
   if (JSON.stringify(state[key]) !== JSON.stringify(value)) set(key, value);
 }
 
-export const setParams = (args) => settings("/arm_sim/set_params", args, (values) => keep("params", values));
-export const setIntegrator = (args) => settings("/arm_sim/set_integrator", args, (values) => keep("integrator", values));
-export const setGains = (args) => settings("/pid_controller/set_gains", args, (values) => keep("gains", values));
-export const setFriction = (args) => settings("/arm_sim/set_friction", args, (values) => keep("friction", values));
-export const setMotors = (args) => settings("/pid_controller/set_limits", args, (values) => keep("motors", values));
-/** The delay is a value of two settings, so a change of one asks for the other. */
-export async function setPeriod(args) {
-  const answer = await settings("/pid_controller/set_period", args, (values) => keep("period", values));
-  if (args.delay !== undefined) await setSensors({});
-  return answer;
-}
-export async function setSensors(args) {
-  const answer = await settings("/pid_controller/set_sensors", args, (values) => keep("sensors", values));
-  if (args.delay !== undefined) await setPeriod({});
-  return answer;
-}
-export const enable = (data) => settings("/pid_controller/enable", data === undefined ? {} : { data }, (values) => keep("enabled", values.data));
+const changing = (/** @type {string} */ group) => (/** @type {Record<string, any>} */ args) => change(group, args);
+export const setParams = changing("params");
+export const setGains = changing("gains");
+export const setIntegrator = changing("integrator");
+export const setPeriod = changing("period");
+export const setFriction = changing("friction");
+export const setMotors = changing("motors");
+export const setSensors = changing("sensors");
 export const disturb = (effort, seconds) => bridge.call("/arm_sim/disturb", { effort, duration: seconds });
 export const solve = (target) => bridge.call("/ik/solve", target);
 export const cancelGoal = () => bridge.call("/ik_action/cancel_goal");
@@ -282,6 +287,8 @@ export const trialStop = () => bridge.call("/ik_trial/stop");
 
 /** Gains for an arm. @param {import("./question.js").Question} question */
 export const suggestGains = (question) => bridge.call("/study/gains", gainsArgs(question), LONG_CALL_MS);
+/** Limits of any robot. @param {Record<string, any>} args */
+export const heldLimit = (args) => bridge.call("/study/held_limit", args, LONG_CALL_MS);
 /** An offline motion. @param {import("./question.js").Question} question @param {import("./question.js").Run} run */
 export const rollout = (question, run) => bridge.call("/study/rollout", rolloutArgs(question, run), LONG_CALL_MS);
 /** Limits of a loop. @param {import("./question.js").Question} question */

@@ -27,29 +27,25 @@ const ONE_CHANGE_MS = 1000;
 
 /** The runtime's default settings, by number of links. A test compares them with the runtime. @type {Record<number, Settings>} */
 export const DEFAULTS = {
-  2: {
-    integrator: { method: "rk4", timestep: 0.001 },
-    params: { gravity: 9.81, masses: [1, 1], lengths: [1, 1] },
-    gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] },
-    period: { period: 0, delay: false },
-    friction: { viscous: [0, 0] },
-    motors: { effort: null, anti_windup: "clamp", tracking_time: 0.2 },
-    sensors: { encoder_step: [0, 0], velocity: "exact", delay: 0 },
-    controller: false,
-    setpoint: [0, 0],
-  },
-  3: {
-    integrator: { method: "rk4", timestep: 0.001 },
-    params: { gravity: 9.81, masses: [1, 1, 1], lengths: [1, 1, 1] },
-    gains: { kp: [2200, 180, 80], ki: [3500, 300, 185], kd: [160, 38, 4.8] },
-    period: { period: 0, delay: false },
-    friction: { viscous: [0, 0, 0] },
-    motors: { effort: null, anti_windup: "clamp", tracking_time: 0.2 },
-    sensors: { encoder_step: [0, 0, 0], velocity: "exact", delay: 0 },
-    controller: false,
-    setpoint: [0, 0, 0],
-  },
+  2: defaults({ kp: [1000, 250], ki: [3000, 750], kd: [110, 22] }),
+  3: defaults({ kp: [2200, 180, 80], ki: [3500, 300, 185], kd: [160, 38, 4.8] }),
 };
+
+/** @param {Gains} gains @returns {Settings} */
+function defaults(gains) {
+  const all = (/** @type {number} */ value) => gains.kp.map(() => value);
+  return {
+    integrator: { method: "rk4", timestep: 0.001 },
+    params: { gravity: 9.81, masses: all(1), lengths: all(1) },
+    gains,
+    period: { period: 0, delay: false },
+    friction: { viscous: all(0) },
+    motors: { effort: null, anti_windup: "clamp", tracking_time: 0.2 },
+    sensors: { encoder_step: all(0), velocity: "exact", delay: 0 },
+    controller: false,
+    setpoint: all(0),
+  };
+}
 
 /** The present settings; null until all are known. @returns {Settings | null} */
 export function presentSettings(/** @type {any} */ live) {
@@ -73,72 +69,51 @@ export function hasSettings(settings) {
   return Object.values(settings).some((one) => one !== null);
 }
 
+// The forms of a value in a link. A wrong value is kept, because the runtime refuses it.
+/** @typedef {{write: (value: any) => string, read: (text: string) => any}} Form */
+/** @type {Form} */
+const TEXT = { write: String, read: String };
+/** @type {Form} */
+const NUMBER = { write: exact, read: (text) => (text.trim() === "" ? NaN : Number(text)) };
+/** @type {Form} */
+const LIST = { write: (values) => values.map(exact).join(","), read: (text) => text.split(",").map(NUMBER.read) };
+/** @type {Form} */
+const LIMITS = { write: (values) => (values ? LIST.write(values) : "none"), read: (text) => (text === "none" ? null : LIST.read(text)) };
+/** @type {Form} */
+const SWITCH = { write: (isOn) => (isOn ? "on" : "off"), read: (text) => (text === "on" || text === "off" ? text === "on" : text) };
+
+/** Each setting in a link: its name there, its group if it has one, its name in the group, its form. @type {[string, string, string, Form][]} */
+const IN_LINKS = [
+  ["method", "integrator", "method", TEXT], ["timestep", "integrator", "timestep", NUMBER],
+  ["gravity", "params", "gravity", NUMBER], ["masses", "params", "masses", LIST], ["lengths", "params", "lengths", LIST],
+  ["kp", "gains", "kp", LIST], ["ki", "gains", "ki", LIST], ["kd", "gains", "kd", LIST],
+  ["period", "period", "period", NUMBER], ["delay", "period", "delay", SWITCH], ["controller", "", "controller", SWITCH],
+  ["viscous", "friction", "viscous", LIST],
+  ["effort_limit", "motors", "effort", LIMITS], ["anti_windup", "motors", "anti_windup", TEXT], ["tracking_time", "motors", "tracking_time", NUMBER],
+  ["encoder_step", "sensors", "encoder_step", LIST], ["velocity_sensor", "sensors", "velocity", TEXT], ["control_delay", "sensors", "delay", NUMBER],
+  ["setpoint", "", "setpoint", LIST], ["position", "start", "position", LIST], ["velocity", "start", "velocity", LIST],
+];
+
 /** @param {Settings} settings @param {number} links */
-export function toFragment({ integrator, params, gains, period, friction, motors, sensors, controller, setpoint }, links) {
-  const list = (/** @type {number[]} */ values) => values.map(exact).join(",");
-  const parts = [
-    ["links", links], ["method", integrator?.method], ["timestep", exact(integrator?.timestep ?? NaN)],
-    ["gravity", exact(params?.gravity ?? NaN)], ["masses", list(params?.masses ?? [])], ["lengths", list(params?.lengths ?? [])],
-    ["kp", list(gains?.kp ?? [])], ["ki", list(gains?.ki ?? [])], ["kd", list(gains?.kd ?? [])],
-    ["period", exact(period?.period ?? NaN)], ["delay", period?.delay ? "on" : "off"], ["controller", controller ? "on" : "off"],
-  ];
-  if (friction?.viscous) parts.push(["viscous", list(friction.viscous)]);
-  if (motors) {
-    parts.push(["effort_limit", motors.effort ? list(motors.effort) : "none"], ["anti_windup", motors.anti_windup]);
-    parts.push(["tracking_time", exact(motors.tracking_time ?? NaN)]);
-  }
-  if (sensors) {
-    parts.push(["encoder_step", list(sensors.encoder_step ?? [])], ["velocity_sensor", sensors.velocity], ["control_delay", exact(sensors.delay ?? NaN)]);
-  }
-  if (setpoint) parts.push(["setpoint", list(setpoint)]);
-  return parts.map(([name, value]) => `${name}=${value}`).join("&");
+export function toFragment(settings, links) {
+  const parts = IN_LINKS.flatMap(([name, group, key, form]) => {
+    const value = /** @type {any} */ (group ? /** @type {any} */ (settings)[group] : settings)?.[key];
+    return value === undefined || (value === null && form !== LIMITS) ? [] : [`${name}=${form.write(value)}`];
+  });
+  return [`links=${links}`, ...parts].join("&");
 }
 
-/** The settings in a link's fragment. Only the form is checked, because the runtime checks the values. @returns {Settings} */
+/** The settings in a link's fragment. @returns {Settings} */
 export function fromFragment(/** @type {string} */ hash) {
   const given = new URLSearchParams(hash.replace(/^#/, ""));
-  const number = (/** @type {string} */ text) => (text.trim() === "" ? NaN : Number(text));
-  const numbers = (/** @type {string} */ name) => given.get(name)?.split(",").map(number);
-  const pick = (/** @type {string[]} */ names, /** @type {(name: string) => any} */ read) => {
-    const found = names.map((name) => [name, read(name)]).filter(([, value]) => value !== undefined);
-    return found.length > 0 ? Object.fromEntries(found) : null;
-  };
-  const single = (/** @type {string} */ name) => (given.has(name) ? number(given.get(name) ?? "") : undefined);
-  /** A text other than on and off is kept, so that the runtime refuses it. @returns {any} */
-  const onOff = (/** @type {string} */ name) => {
-    const text = given.get(name) ?? undefined;
-    return text === "on" || text === "off" ? text === "on" : text;
-  };
-  return {
-    integrator: pick(["method", "timestep"], (name) => (name === "method" ? given.get(name) ?? undefined : single(name))),
-    params: pick(["gravity", "masses", "lengths"], (name) => (name === "gravity" ? single(name) : numbers(name))),
-    gains: pick(["kp", "ki", "kd"], numbers),
-    period: pick(["period", "delay"], (name) => (name === "period" ? single(name) : onOff(name))),
-    friction: pick(["viscous"], numbers),
-    motors: motorsIn(given, numbers, single),
-    sensors: sensorsIn(given, numbers, single),
-    controller: onOff("controller") ?? null,
-    setpoint: numbers("setpoint") ?? null,
-    ...(given.has("position") || given.has("velocity") ? { start: pick(["position", "velocity"], numbers) } : {}),
-  };
-}
-
-/** The limits of the motors in a link; null if it has none. @returns {Settings["motors"]} */
-function motorsIn(/** @type {URLSearchParams} */ given, /** @type {(name: string) => any} */ numbers, /** @type {(name: string) => any} */ single) {
-  const anti_windup = given.get("anti_windup");
-  const tracking_time = single("tracking_time");
-  const found = {
-    ...(given.has("effort_limit") ? { effort: given.get("effort_limit") === "none" ? null : numbers("effort_limit") } : {}),
-    ...(anti_windup === null ? {} : { anti_windup }), ...(tracking_time === undefined ? {} : { tracking_time }),
-  };
-  return Object.keys(found).length > 0 ? found : null;
-}
-
-/** The sensors in a link; null if it has none. @returns {Settings["sensors"]} */
-function sensorsIn(/** @type {URLSearchParams} */ given, /** @type {(name: string) => any} */ numbers, /** @type {(name: string) => any} */ single) {
-  const [encoder_step, velocity, delay] = [numbers("encoder_step"), given.get("velocity_sensor") ?? undefined, single("control_delay")];
-  const found = Object.entries({ encoder_step, velocity, delay }).filter(([, value]) => value !== undefined);
-  return found.length > 0 ? Object.fromEntries(found) : null;
+  const settings = /** @type {any} */ (Object.fromEntries(Object.keys(DEFAULTS[2]).map((key) => [key, null])));
+  for (const [name, group, key, form] of IN_LINKS) {
+    const text = given.get(name);
+    if (text === null) continue;
+    if (group) settings[group] = { ...settings[group], [key]: form.read(text) };
+    else settings[key] = form.read(text);
+  }
+  return settings;
 }
 
 function isSame(/** @type {Settings} */ one, /** @type {Settings | null} */ other) {

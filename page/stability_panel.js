@@ -10,6 +10,7 @@ import { copyable } from "./copy.js";
 import { shrinks } from "./course.js";
 import { byId, el, setText } from "./dom.js";
 import { duration, methodName, METHODS } from "./format.js";
+import { robotForm } from "./held_limit.js";
 import { latestOnly } from "./latest.js";
 import { answerInForce, factorOf, limitInForce, limitText, scaled, whyText } from "./policy.js";
 import { fromRest, isFree, questionOf, stabilityArgs, stepsPerUpdate } from "./question.js";
@@ -40,6 +41,7 @@ let anchor = null;
 
 export function startStability() {
   startLimits();
+  byId("stability").append(robotForm());
   const canvas = byId("map");
   map = new Surface(canvas, drawStability);
   watch(["integrator", "gains", "params", "period", "setpoint", "limits", "enabled", "tab", "links"], () => map.redraw());

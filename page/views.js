@@ -11,10 +11,6 @@ import { isAlone, linksIn } from "./kernel.js";
 import { fromFragment, hasSettings, presentSettings, toFragment } from "./settings.js";
 import { set, state, watch } from "./store.js";
 
-/** A link with settings but without a step opens the workbench. */
-const SETTINGS = new RegExp("(^#|&)(links|method|timestep|gravity|masses|lengths|kp|ki|kd|period|delay|viscous|effort_limit|encoder_step"
-  + "|velocity_sensor|control_delay|controller|setpoint|workbench)\\b");
-
 export function startViews() {
   byId("view-switch").addEventListener("click", () => show(state.view === "course" ? "workbench" : "course"));
   const refuse = () => announce("Full screen is not allowed here.");
@@ -47,7 +43,8 @@ export function startViews() {
 /** The view that the address names; empty if it names none. @returns {"course" | "workbench" | ""} */
 function viewInLink() {
   if (stepIn(location.hash) >= 0) return "course";
-  return SETTINGS.test(location.hash) ? "workbench" : "";
+  // A link with settings but without a step opens the workbench.
+  return hasSettings(fromFragment(location.hash)) || /(^#|&)(links|workbench)\b/.test(location.hash) ? "workbench" : "";
 }
 
 /** In the page in one file the number of links can be chosen. Another number needs another arm, so the page is reloaded. */

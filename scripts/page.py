@@ -2,7 +2,7 @@
 """Makes the page one file that needs no server: `scripts/page.py MODULE.wasm NOTICES.txt OUTPUT.html`.
 
 The files of `page/` become one script: each module is a function, in the order of imports, and `pendularm` has their
-exports. The script and the WebAssembly module are stored as gzip in base64.
+exports. The script and the WebAssembly module are stored as gzip in base 85.
 
 Invariant: the file makes no network request, and its own policy forbids them.
 """
@@ -22,18 +22,21 @@ COMMENT = re.compile(r"^ *(//[^\n]*|/\*\*((?!\*/).)*\*/)\n", re.M | re.S)
 POLICY = ("default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; "
           "img-src data: blob:; base-uri 'none'; form-action 'none'")
 LOADER = """
-(async () => {
-  const packed = Uint8Array.from(atob(document.querySelector("#page-script").textContent), (one) => one.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+unpack(document.querySelector("#page-script").textContent).then((bytes) => {
   const script = document.createElement("script");
-  script.textContent = await new Response(stream).text();
+  script.textContent = new TextDecoder().decode(bytes);
   document.head.append(script);
-})();
+});
 """
 
 
+# The digits of base 85: those of Python, and those of `page/packed.js`, which end no script.
+DIGITS = bytes.maketrans(b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;<=>?@^_`{|}~",
+                         bytes(code for code in range(40, 126) if code != ord("<")))
+
+
 def packed(data):
-    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
+    return base64.b85encode(gzip.compress(data, 9, mtime=0)).translate(DIGITS).decode()
 
 
 def modules(name, done, above=()):
@@ -72,9 +75,10 @@ def main(module, notices, output):
     style = re.sub(r"/\*.*?\*/\s*", "", (PAGE / "style.css").read_text(), flags=re.S)
     text = replaced(text, '<link rel="stylesheet" href="style.css">', f"<style>\n{style}</style>")
     text = replaced(text, '  <script type="module" src="main.js"></script>\n', "")
+    unpack = COMMENT.sub("", (PAGE / "packed.js").read_text()).replace("export ", "")
     carried = {"page-script": script.encode(), "kernel-module": pathlib.Path(module).read_bytes()}
     scripts = "".join(f'<script type="text/plain" id="{name}">{packed(data)}</script>\n' for name, data in carried.items())
-    text = replaced(text, "</body>", f"{scripts}<script>{LOADER}</script>\n</body>")
+    text = replaced(text, "</body>", f"{scripts}<script>{unpack}{LOADER}</script>\n</body>")
     pathlib.Path(output).write_text(text)
     size = len(text.encode())
     print(f"page.py: {output}, {size} bytes")

@@ -9,13 +9,13 @@
 //!
 //! | feature | default | adds |
 //! | --- | --- | --- |
-//! | `services` | yes | `protocol`, `services`, `live`: the live arm and its services as plain values |
+//! | `services` | yes | `protocol`, `services`, `live`: the live arm and its services as plain values; `score` |
 //! | `runtime` | yes | `actors`, `address`, `options`, `logging`, `output`, `plan`, `signals`, and the program |
 //! | `web` | yes | `web`: HTTP, the WebSocket and the page |
 //! | `batch` | yes | `math::simulation::batch`: many arms in the lanes of the processor's registers |
 //! | `report` | yes | `report`, with its experiments |
 //! | `record` | yes | `record`: records of runs, written, read and replayed |
-//! | `cli` | yes | `command`: commands for a running pendularm, completions; `score` |
+//! | `cli` | yes | `command`: commands for a running pendularm, completions |
 //! | `conformance` | yes | `referee`, `sabotage`: the rules of the specification against any server, and servers with a fault |
 //!
 //! Without default features the library is [`math`] and [`study`], which is enough to step arms. Its dependencies
@@ -63,7 +63,7 @@ pub mod referee;
 pub mod report;
 #[cfg(feature = "conformance")]
 pub mod sabotage;
-#[cfg(feature = "cli")]
+#[cfg(feature = "services")]
 pub mod score;
 #[cfg(feature = "services")]
 pub mod services;

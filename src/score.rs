@@ -48,11 +48,30 @@ enum Actions {
     Rows(Vec<[String; 2]>),
 }
 
+/// An episode that agrees with its submission.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Replay {
+    /// Task, seed, number of steps, score and verdict.
+    pub words: String,
+    /// Joint angles \[rad\] at the start and after each step.
+    pub poses: Vec<[f64; 2]>,
+    /// The target of the end effector \[m\], if the task has one.
+    pub target: Option<[f64; 2]>,
+}
+
 /// Recomputes the episode of a submission, and returns its score, the sum of the rewards, in a sentence.
 ///
 /// # Errors
 /// The reason for a refusal, such as the first step at which the submission differs. Step 0 is the start.
 pub fn score(submission: &[u8]) -> Result<String, String> {
+    replay(submission).map(|replay| replay.words)
+}
+
+/// The same with the motion.
+///
+/// # Errors
+/// As [`score`].
+pub fn replay(submission: &[u8]) -> Result<Replay, String> {
     let given: Submission =
         serde_json::from_slice(submission).map_err(|why| format!("not a submission: {why}"))?;
     let (version, task, seed) = (given.version, given.task, given.seed);
@@ -75,13 +94,18 @@ pub fn score(submission: &[u8]) -> Result<String, String> {
         return Err(format!("more than {most} actions"));
     }
     let (mut steps, mut score) = (0, 0.0_f64);
+    let mut poses = vec![episode.arm.state().position];
     while given.trail.get(steps) == Some(&digits(episode.hash)) {
         if steps == last || episode.is_lost() {
             let is_whole = given.trail.len() == steps + 1 && given.score == digits(score.to_bits());
             if is_whole && rows.is_none_or(|rows| rows.len() == steps) {
-                return Ok(format!(
-                    "{task}, seed {seed}, {steps} steps, score {score:?}: confirmed"
-                ));
+                return Ok(Replay {
+                    words: format!(
+                        "{task}, seed {seed}, {steps} steps, score {score:?}: confirmed"
+                    ),
+                    poses,
+                    target: episode.target,
+                });
             }
             break;
         }
@@ -94,6 +118,7 @@ pub fn score(submission: &[u8]) -> Result<String, String> {
                 .map(|rate| if rate >= 0.0 { push } else { -push }),
         };
         score += episode.step(action);
+        poses.push(episode.arm.state().position);
         steps += 1;
     }
     Err(format!(

@@ -50,6 +50,11 @@ def by_wheel(submission):
         return str(refusal)
 
 
+def test_the_kept_submissions_of_the_page_are_the_first_ones():
+    kept = Path(__file__).parents[2] / "tests/data/submissions.jsonl"
+    assert kept.read_text(encoding="utf-8").splitlines() == [json.dumps(one) for one in generated(20)]
+
+
 def test_a_thousand_submissions_agree_in_program_and_wheel(tmp_path):
     submissions = list(generated(1000))
     lines, errors, status = by_program(tmp_path, submissions)

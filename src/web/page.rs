@@ -31,11 +31,11 @@ macro_rules! assets {
 pub const ASSETS: &[Asset] = assets! {
     "index.html" "icon.svg" "style.css" "actions.js" "aim.js" "answers.js" "arm_view.js"
     "chart.js" "compare.js" "controls.js" "copy.js" "course.js" "course_view.js" "dom.js"
-    "field.js" "format.js" "history.js" "kernel.js" "keyboard.js" "ladder.js" "ladder_panel.js"
-    "latest.js" "main.js" "mechanics.js" "motions.js" "plots.js" "policy.js" "question.js"
+    "field.js" "format.js" "held_limit.js" "history.js" "kernel.js" "keyboard.js" "ladder.js" "ladder_panel.js"
+    "latest.js" "main.js" "mechanics.js" "motions.js" "packed.js" "plots.js" "policy.js" "question.js"
     "readouts.js" "realism.js" "responses.js" "rosbridge.js" "runtime.js" "scale.js" "scenes.js"
     "settings.js" "sheet.js" "stability_panel.js" "store.js" "strip_chart.js" "study.js"
-    "surface.js" "tasks_panel.js" "theme.js" "trail.js" "transport.js" "views.js"
+    "submission.js" "surface.js" "tasks_panel.js" "theme.js" "trail.js" "transport.js" "views.js"
 };
 
 /// The file at `path`, if it is part of the page.

@@ -184,6 +184,9 @@ fn arguments(links: usize) -> Vec<Value> {
         json!({"error": 0.01, "controller": true, "duration": 0.5, "setpoint": per_joint(0.2)}),
         json!({"params": {"masses": per_joint(3.0)}, "gains": {"kp": per_joint(200.0)}, "duration": 0.3}),
         json!({"params": {"masses": 3}, "gains": {"kp": "stiff"}}),
+        json!({"mass_matrix": [3, 0.5, 0.5, 1], "kp": [40], "kd": [3, 2], "ki": 1, "period": 0.01, "delay": 1}),
+        json!({"mass_matrix": [3, 0.5, 0.5, 1], "kp": [40], "kd": [3, 2], "period": 0.01, "between": "implicit", "steps": 3}),
+        json!({"mass_matrix": [1, 2, 3], "kp": ["stiff"], "period": -1, "between": "nothing"}),
     ]
 }
 
@@ -196,6 +199,7 @@ fn is_of_the_study(links: usize, service: &str, args: &Value) -> bool {
     let known = match service {
         "/study/gains" => &["settling_time", "margin"][..],
         "/study/rollout" => &["samples", "params", "gains"],
+        "/study/held_limit" => &["mass_matrix"],
         _ => &["params", "control_period"],
     };
     let is_quick = links == 2 || service != "/study/gains";
@@ -203,7 +207,7 @@ fn is_of_the_study(links: usize, service: &str, args: &Value) -> bool {
 }
 
 /// The services of the page, and one more; the others need a server.
-const SERVED: [&str; 23] = [
+const SERVED: [&str; 24] = [
     "/arm_sim/set_params",
     "/arm_sim/set_friction",
     "/arm_sim/set_integrator",
@@ -226,6 +230,7 @@ const SERVED: [&str; 23] = [
     "/study/stability",
     "/study/gains",
     "/study/rollout",
+    "/study/held_limit",
     "/nobody/knows",
 ];
 
@@ -264,6 +269,24 @@ where
 fn every_answer_of_an_arm_of_two_or_three_links_is_the_same() {
     in_virtual_time(every_answer_is_the_same::<2>());
     in_virtual_time(every_answer_is_the_same::<3>());
+}
+
+#[test]
+fn a_method_of_ones_own_is_refused_with_the_reason() {
+    in_virtual_time(async {
+        let mut both = Both::<2>::start().await;
+        let euler = json!({"tableau": {"a": [[]], "b": [1]}, "duration": 0.1, "error": 0.1});
+        for service in ["/study/method", "/study/rollout", "/study/plan"] {
+            let (theirs, ours) = both.call(service, euler.clone()).await;
+            assert_eq!(theirs[0]["result"], true, "{service}: {theirs}");
+            assert_eq!(ours[0]["result"], false, "{service}: {ours}");
+            let why = ours[0].to_string();
+            assert!(
+                why.contains("tableau: a method of your own needs a server"),
+                "{why}"
+            );
+        }
+    });
 }
 
 /// Both, subscribed to topics, after calls. After each call time passes \[ms\].

@@ -7,6 +7,9 @@ import unittest
 
 from alone import FILE
 from stage import IS_FILE, PageTest, needs_chromium
+from test_layout import audit, forget_the_inspectors
+
+SUBMISSIONS = pathlib.Path(__file__).parents[1] / "data/submissions.jsonl"
 
 # Sends the texts of the page to the page around it.
 REPORT = """<script>setInterval(() => parent.postMessage([document.querySelector("#connection").className,
@@ -52,13 +55,31 @@ class AloneTest(PageTest):
         self.assertEqual(page.complaints, [])
 
     def test_the_kernel_has_the_bits_of_the_native_program(self):
-        ours = self.page.run("""pendularm["kernel.js"].unpack(document.querySelector("#kernel-module").textContent)
+        ours = self.page.run("""pendularm["packed.js"].unpack(document.querySelector("#kernel-module").textContent)
             .then((bytes) => WebAssembly.instantiate(bytes, { env: { milliseconds: () => performance.now() } }))
             .then(({ instance: { exports } }) => { const length = exports.compare(); return new TextDecoder().decode(new Uint8Array(exports.memory.buffer,
                 exports.output(), length)); })""")
         native = pathlib.Path(os.environ["RUNS"]).read_text()
         self.assertEqual(len(native.splitlines()), 32)
         self.assertEqual(ours, native, "16 runs and 16 answers")
+
+    def test_a_submission_is_opened_or_dropped_judged_and_played(self):
+        text = SUBMISSIONS.read_text().splitlines()[1]
+        wrong = text.replace('"trail": ["', '"trail": ["0', 1)
+        for given, how, said in ((text, "drop", ": confirmed"), (wrong, "open", ": refused, departs at step 0"), (text, "open", ": confirmed")):
+            self.page.run("""((text, how) => {
+                const data = new DataTransfer(), input = document.querySelector('#submission-file');
+                data.items.add(new File([text], 'mine.json'));
+                if (how === 'open') { input.files = data.files; input.dispatchEvent(new Event('change')); }
+                else document.dispatchEvent(new DragEvent('drop', { dataTransfer: data, cancelable: true }));
+            })(%s, %s)""" % (json.dumps(given), json.dumps(how)))
+            self.page.until(f"document.querySelector('#submission-text').textContent.endsWith({json.dumps(said)})")
+            self.assertEqual(self.page.run("document.querySelector('#submission-motion').checkVisibility()"), given == text)
+        self.assertEqual(json.loads(text)["task"], "PendularmReach-v0")
+        for color in ("accent", "target"):
+            self.wait(lambda: self.image("#submission-motion").count(self.color(color)) > 20, f"the {color}")
+        self.assertEqual(audit(self.page), [])
+        forget_the_inspectors(self.page)
 
     def test_the_time_of_a_short_run_is_finer_than_the_clock_of_the_browser(self):
         """The browser's clock goes in steps of 0.1 ms: an answer between its steps is a mean of many runs."""

@@ -220,3 +220,62 @@ class Right(PageTest):
         self.page.until(f"document.querySelector('#setpoint-fields {NUMBER}').value === '-3.756e+73'")
         self.assertEqual(self.setpoint_fields()[1], 3.006)
         self.assertEqual(self.page.run(CLIPPED), [])
+
+
+class Robot(PageTest):
+    """The limit of any robot: one form, in the Workbench and in the course's last step."""
+
+    answer = "document.querySelector('{0} .robot-answer').textContent"
+
+    def form(self, place):
+        """Opens the form by the keyboard."""
+        self.page.until(f"document.querySelector('{place} .robot summary') !== null")
+        self.page.run(f"document.querySelector('{place} .robot summary').focus()")
+        self.page.key("Enter")
+        self.page.until(f"document.querySelector('{place} .robot textarea').value !== ''", why="the present arm")
+
+    def asks(self, place, **values):
+        """Writes into fields, by their labels, and presses the button. The answer, or the refusal."""
+        for label, value in values.items():
+            self.page.run(f"""(() => {{ const field = [...document.querySelectorAll('{place} .robot label')]
+                .find((one) => one.textContent.startsWith({json.dumps(label.replace("_", " "))})).querySelector('textarea, input, select');
+                field.value = {json.dumps(value)}; field.dispatchEvent(new Event('input', {{ bubbles: true }})); }})()""")
+        self.assertEqual(self.page.run(self.answer.format(place)), "", "an answer goes with a change")
+        self.page.click(f"{place} .robot button[type=submit]")
+        return self.page.until(f"{self.answer.format(place)} || document.querySelector('{place} .robot .refusal').textContent")
+
+    def test_the_form_begins_with_the_arm_and_its_limit_and_takes_any_matrix(self):
+        pose = [0.9, -1.3, 0.4][:self.links]
+        self.runtime.call("/arm_sim/set_friction", viscous=[0.4] * self.links)
+        self.settle(pose)
+        for place in ("#stability", "#course"):
+            if place == "#course":
+                self.page.click("#view-switch")
+                self.page.click("#course-steps [data-step=own]")
+                self.page.until("!document.querySelector('#course-dial').inert", why="the scene")
+                pose = [0] * self.links
+            else:
+                self.tab("stability")
+            self.page.until(f"own('store.js').then(({{ state }}) => state.limits.answers.rk4?.equilibrium?.every((q, i) => "
+                f"Math.abs(q - {pose}[i]) < 1e-3))", why="the limits there")
+            self.form(place)
+            limit = self.values("/study/stability")["control_period_limit"]
+            self.assertIn(f"Longest control period: {milliseconds(limit)}", self.asks(place))
+            # A copied matrix of seven joints, as numpy prints it.
+            rows = [[7 - max(i, j) + (i == j) * 0.5 for j in range(7)] for i in range(7)]
+            told = self.asks(place, mass="[" + "\n ".join(str(row) for row in rows) + "]", kp="40", ki="", kd="3,3,3,3,3,3,2", damping="0", stiffness="",
+                motion="semi_implicit", delay="1", steps="2")
+            wanted = self.values("/study/held_limit", mass_matrix=sum(rows, []), kp=[40], kd=[3] * 6 + [2], delay=1, between="semi_implicit", steps=2)
+            self.assertIn(f"Longest control period: {milliseconds(wanted['period_limit'])}", told)
+            self.assertIn("joint 7 ", told)
+            for field, value, said in (("mass", "1 2\n3", "M must have n² entries, got 3"), ("mass", "1 2 3 1", "M must be symmetric: M at row 2, column 1"),
+                    ("kp", "stiff", "kp must be an array of numbers"), ("kd", "1 2 3", "kd must have"), ("control", "0", "control period must be"),
+                    ("delay", "9", "delay must be"), ("steps", "0", "steps must be")):
+                self.asks(place, mass="2 0.1\n0.1 1", kp="40", kd="3", control="4", delay="0", steps="1")
+                self.assertIn(said, self.asks(place, **{field: value}))
+            self.page.run(f"[...document.querySelectorAll('{place} .robot button')].at(-1).click()")
+            self.assertIn(f"Longest control period: {milliseconds(limit)}", self.asks(place, motion="exact", steps="1"))
+
+
+class RobotOfThreeLinks(Robot):
+    links = 3

@@ -1,12 +1,13 @@
 // Compares 16 runs of the kernel in the page and 16 answers of it with native ones, to the bit: `runs.mjs NATIVE.txt pendularm.html`.
 
 import { readFileSync } from "node:fs";
-import { gunzipSync } from "node:zlib";
+
+import { unpack } from "../../page/packed.js";
 
 const [native, page] = process.argv.slice(2).map((name) => readFileSync(name, "utf8"));
 const carried = /id="kernel-module">([^<]*)</.exec(page)[1];
 const environment = { env: { milliseconds: () => performance.now() } };
-const { instance } = await WebAssembly.instantiate(gunzipSync(Buffer.from(carried, "base64")), environment);
+const { instance } = await WebAssembly.instantiate(await unpack(carried), environment);
 const { memory, compare, output } = instance.exports;
 const length = compare();
 const ours = Buffer.from(memory.buffer, output(), length).toString();

@@ -117,6 +117,7 @@ test("a refusal has the names of the page's fields", () => {
     "period must be at least 0, got -1": "control period must be at least 0, got -1",
     'data must be true or false, got "maybe"': 'controller must be on or off, got "maybe"',
     "masses must have 2 entries, got 1": "masses must have 2 entries, got 1",
+    "M must be symmetric: M[11][0] is 1": "M must be symmetric: M at row 12, column 1 is 1",
   };
   for (const [status, text] of Object.entries(shown)) assert.equal(inPageNames(status), text);
 });
@@ -145,7 +146,7 @@ test("a request with a number that is not finite is refused, because null can me
 test("each link of the worksheets sets everything", () => {
   const text = readFileSync(new URL("../../course/worksheets.md", import.meta.url), "utf8");
   const links = [...text.matchAll(/\(\.\.\/pendularm\.html(#[^)]*)\)/g)].map(([, hash]) => hash);
-  assert.equal(links.length, 6);
+  assert.equal(links.length, 8);
   for (const link of links) {
     const settings = fromFragment(link);
     for (const [key, wanted] of Object.entries(DEFAULTS[2])) {

@@ -9,6 +9,8 @@
 use std::cell::RefCell;
 use std::time::Duration;
 
+use pendularm::score::replay;
+
 use crate::kernel::{Kernel, LINKS};
 use crate::runs;
 
@@ -99,6 +101,18 @@ pub extern "C" fn compute(budget: u32) -> bool {
 #[unsafe(no_mangle)]
 pub extern "C" fn collect() -> usize {
     give(with_kernel!(kernel => kernel.take_frames()))
+}
+
+/// Recomputes the submission in that buffer. Returns the number of bytes of a JSON array: the words, then the poses and the
+/// target of a submission that agrees.
+#[unsafe(no_mangle)]
+pub extern "C" fn score() -> usize {
+    let found = replay(&INPUT.take());
+    let told = found.map_or_else(
+        |why| serde_json::to_vec(&(why,)),
+        |replay| serde_json::to_vec(&(replay.words, replay.poses, replay.target)),
+    );
+    give(told.unwrap_or_default())
 }
 
 /// Makes the runs that are compared with the native ones. Returns the number of bytes of their text.

@@ -14,7 +14,7 @@ use pendularm::services::arm::{
 };
 use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
 use pendularm::services::study::{
-    Computed, PlanRun, PredictStability, Present, RunOffline, SuggestGains, Work,
+    Computed, FindHeldLimit, PlanRun, PredictStability, Present, RunOffline, SuggestGains, Work,
 };
 use pendularm::services::trial::TrialRequest;
 use pendularm::services::{Address, Ask, NoService};
@@ -22,6 +22,10 @@ use pendularm::services::{Address, Ask, NoService};
 use super::Kernel;
 use super::computing::Answering;
 use super::repeated::Repeated;
+
+/// Why a method of one's own is refused.
+const OWN_METHOD: &str =
+    "tableau: a method of your own needs a server, and the page in one file has none";
 
 /// Whether a request has a method of one's own, which the kernel does not have.
 fn has_tableau(service: Service, args: &Arguments) -> bool {
@@ -79,11 +83,15 @@ impl<const N: usize> Kernel<N> {
             Service::Stability => {
                 self.begin::<PredictStability<N>, _>(own, &args, to, Computed::work);
             }
+            Service::HeldLimit => {
+                self.begin::<FindHeldLimit, _>(own, &args, to, Computed::work);
+            }
             Service::SuggestGains => {
                 self.begin::<SuggestGains<N>, _>(own, &args, to, Computed::work);
             }
+            Service::Method => self.send(to.failure(OWN_METHOD)),
             Service::Plan | Service::Rollout if has_tableau(own, &args) => {
-                self.send(to.failure("tableau needs a server"));
+                self.send(to.failure(OWN_METHOD));
             }
             Service::Plan => self.begin::<PlanRun<N>, _>(own, &args, to, Computed::work),
             Service::Rollout => self.begin::<RunOffline<N>, _>(own, &args, to, Repeated::new),
