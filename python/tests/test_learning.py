@@ -114,6 +114,13 @@ def test_ppo_learns_on_it(make):
     assert model.num_timesteps >= 2048
 
 
+class Stored:
+    """A reference to a value that Ray has."""
+
+    def __init__(self, value):
+        self.value = value
+
+
 class Remote:
     """A remote function that is called at once."""
 
@@ -125,14 +132,14 @@ class Remote:
 
         self.ray.calls.append(args)
         done = Future()
-        done.set_result(self.function(*(arg["stored"] if isinstance(arg, dict) else arg for arg in args)))
+        done.set_result(self.function(*(arg.value if isinstance(arg, Stored) else arg for arg in args)))
         return types.SimpleNamespace(future=lambda: done)
 
 
-def test_a_sweep_sends_its_grid_to_ray_once(monkeypatch):
+def test_a_sweep_sends_its_metric_to_ray_once(monkeypatch):
     ray = types.ModuleType("ray")
     ray.calls, ray.puts = [], []
-    ray.put = lambda thing: ray.puts.append(thing) or {"stored": thing}
+    ray.put = lambda thing: ray.puts.append(thing) or Stored(thing)
     ray.remote = lambda *function, **options: Remote(ray, *function) if function else lambda one: Remote(ray, one)
     monkeypatch.setitem(sys.modules, "ray", ray)
     ask = {"grid": {"kp": np.linspace(50, 500, 20)}, "metric": "final_error", "duration": 0.1, "piece": 3}
@@ -141,7 +148,7 @@ def test_a_sweep_sends_its_grid_to_ray_once(monkeypatch):
         assert np.array_equal(found["final_error"], pendularm.sweep(**ask)["final_error"])
     assert len(ray.puts) == 2
     assert len(ray.calls) == 14
-    assert all(isinstance(question, dict) for question, *_ in ray.calls)
+    assert all(isinstance(question, Stored) for question, *_ in ray.calls)
 
 
 def test_a_sweep_on_ray_has_the_same_bits():
