@@ -1,4 +1,4 @@
-"""The adapters to stable-baselines3, RLlib and Ray. `make test-learning` installs both; without them these tests are skipped."""
+"""The adapters to stable-baselines3, RLlib and Ray. `make test-learning` installs them; without one its tests are skipped."""
 
 import importlib.util
 import os
