@@ -185,16 +185,17 @@ def test_a_sweep_sends_its_metric_to_ray_once(monkeypatch):
     assert all(isinstance(question, Stored) for question, *_ in ray.calls)
 
 
-@pytest.fixture
-def ray(monkeypatch):
-    """Ray with two workers, on loopback."""
+@pytest.fixture(scope="module")
+def ray():
+    """Ray with two workers, on loopback. It reads its token once per process."""
     ray = pytest.importorskip("ray")
-    # Otherwise Ray writes a token to the home folder.
-    monkeypatch.setenv("RAY_AUTH_TOKEN", secrets.token_hex(32))
     small = {"object_store_memory": 200_000_000, "include_dashboard": False, "log_to_driver": False}
-    ray.init(num_cpus=2, _node_ip_address="127.0.0.1", **small)
-    yield ray
-    ray.shutdown()
+    with pytest.MonkeyPatch.context() as patch:
+        # Otherwise Ray writes a token to the home folder.
+        patch.setenv("RAY_AUTH_TOKEN", secrets.token_hex(32))
+        ray.init(num_cpus=2, _node_ip_address="127.0.0.1", **small)
+        yield ray
+        ray.shutdown()
 
 
 def test_a_sweep_on_ray_has_the_same_bits_although_a_worker_is_lost(ray, tmp_path):
