@@ -135,7 +135,7 @@ wheel: $(if $(PORTABLE),,build) ## Build the Python wheel with the program into 
 test-python: wheel ## Install the wheel into a fresh virtual environment and test it there; ARGS="-k batch" selects tests
 	@bash scripts/test-python.sh $(ARGS)
 
-test-learning: wheel ## Test the adapters to stable-baselines3 and Ray; installs both, and torch, which needs some 6 GB; ARGS=--quick does without torch and Ray
+test-learning: wheel ## Test with stable-baselines3, RLlib and Ray; installs them, and torch, which needs some 7 GB; ARGS=--quick does without torch and Ray
 	@bash scripts/test-python.sh --learning $(ARGS)
 
 ros2: ## Connect a running arm to a ROS 2 graph on Zenoh; ARGS="--connect 127.0.0.1:9095 --domain 0 --namespace /left"; PROFILE=dev uses the tests' build

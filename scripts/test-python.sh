@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the wheel of `make wheel` into a fresh virtual environment, and tests it there. Arguments are passed to
-# pytest. With --learning first, it tests only the adapters to stable-baselines3 and Ray, with both installed. --quick
+# pytest. With --learning first, it tests only with stable-baselines3, RLlib and Ray, and installs them. --quick
 # after it installs neither torch nor Ray, and skips what needs them.
 set -euo pipefail
 cd "$(dirname "$0")/../python"
@@ -13,7 +13,7 @@ python3 -m venv "$environment"
 "$environment/bin/pip" install --quiet --disable-pip-version-check "$wheel" --requirement tests/requirements.txt
 if [ "${1:-}" = --learning ]; then
     shift
-    more=(stable-baselines3==2.9.2 ray==2.60.0)
+    more=(stable-baselines3==2.9.2 'ray[rllib]==2.60.0')
     [ "${1:-}" != --quick ] || { shift; more=(--no-deps stable-baselines3==2.9.2); }
     "$environment/bin/pip" install --quiet --disable-pip-version-check "${more[@]}"
     set -- tests/test_learning.py "$@"

@@ -12,16 +12,18 @@
 
 use std::array::from_fn;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use serde::Deserialize;
 
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::gravity_load;
 use crate::math::kinematics::forward;
+use crate::math::limits::Limits;
 use crate::math::pid::Gains;
 use crate::math::simulation::Simulation;
 
-/// Most bytes of a submission. The longest episode has some 20,000.
+/// Most bytes of a submission. The longest episode has some 80,000.
 pub const MOST_BYTES: u64 = 1 << 20;
 /// Simulation time of a step of an environment \[s\], and its timesteps.
 const STEP: (f64, u64) = (0.05, 10);
@@ -40,12 +42,12 @@ struct Submission {
     score: String,
 }
 
-/// One row per step, or the name of a policy.
+/// One row per step, with a number per motor, or the name of a policy.
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
 enum Actions {
     Policy(String),
-    Rows(Vec<[String; 2]>),
+    Rows(Vec<Vec<String>>),
 }
 
 /// An episode that agrees with its submission.
@@ -79,7 +81,9 @@ pub fn replay(submission: &[u8]) -> Result<Replay, String> {
         return Err(format!("made by another version, {version:?}"));
     }
     let (mut episode, most) = match task.as_str() {
-        "Pendularm-v0" => (Episode::swing_up(seed), 200),
+        "Pendularm-v0" => (Episode::swing_up(seed, 0.5, 0..2), 200),
+        "PendularmAcrobot-v0" => (Episode::swing_up(seed, 4.0, 1..2), 2000),
+        "PendularmPendubot-v0" => (Episode::swing_up(seed, 1.0, 0..1), 2000),
         "PendularmReach-v0" => (Episode::reach(seed), 100),
         _ => return Err(format!("no task {task:?}")),
     };
@@ -92,6 +96,12 @@ pub fn replay(submission: &[u8]) -> Result<Replay, String> {
     let last = rows.as_ref().map_or(most, Vec::len);
     if last > most {
         return Err(format!("more than {most} actions"));
+    }
+    let motors = episode.driven.len();
+    if rows.iter().flatten().any(|row| row.len() != motors) {
+        return Err(format!(
+            "not a submission: each action must have {motors} numbers"
+        ));
     }
     let (mut steps, mut score) = (0, 0.0_f64);
     let mut poses = vec![episode.arm.state().position];
@@ -110,14 +120,16 @@ pub fn replay(submission: &[u8]) -> Result<Replay, String> {
             break;
         }
         let action = match rows.as_ref().and_then(|rows| rows.get(steps)) {
-            Some([one, two]) => [number(one)?, number(two)?],
-            None => episode
-                .arm
-                .state()
-                .velocity
-                .map(|rate| if rate >= 0.0 { push } else { -push }),
+            Some(row) => row
+                .iter()
+                .map(|text| number(text))
+                .collect::<Result<Vec<_>, _>>()?,
+            None => episode.arm.state().velocity[episode.driven.clone()]
+                .iter()
+                .map(|&rate| if rate >= 0.0 { push } else { -push })
+                .collect(),
         };
-        score += episode.step(action);
+        score += episode.step(&action);
         poses.push(episode.arm.state().position);
         steps += 1;
     }
@@ -146,18 +158,21 @@ struct Episode {
     arm: Simulation<2>,
     /// The target of the end effector \[m\], if the task has one.
     target: Option<[f64; 2]>,
-    /// Efforts of an action of 1 \[N m\].
+    /// The joints with a motor.
+    driven: Range<usize>,
+    /// Efforts of an action of 1, if each joint has a motor \[N m\].
     efforts: [f64; 2],
     hash: u64,
 }
 
 impl Episode {
-    fn swing_up(seed: u32) -> Self {
+    /// An action of 1 is `strength` of the effort that holds the stretched arm, at the `driven` joints.
+    fn swing_up(seed: u32, strength: f64, driven: Range<usize>) -> Self {
         let mut random = Random::new(seed);
         let mut off = || from_fn(|_| -0.1 + 0.2 * random.uniform());
         let (mut position, velocity): ([f64; 2], _) = (off(), off());
         position[0] -= PI / 2.0;
-        Self::begin(State { position, velocity }, 0.5, None)
+        Self::begin(State { position, velocity }, strength, driven, None)
     }
 
     fn reach(seed: u32) -> Self {
@@ -167,17 +182,31 @@ impl Episode {
         let target = bearing.to_array().map(|part| distance * (0.5 * part));
         let mut state = State::rest();
         state.position = from_fn(|_| PI * (2.0 * random.uniform() - 1.0));
-        Self::begin(state, 2.0, Some(target))
+        Self::begin(state, 2.0, 0..2, Some(target))
     }
 
-    fn begin(state: State<2>, strength: f64, target: Option<[f64; 2]>) -> Self {
+    fn begin(
+        state: State<2>,
+        strength: f64,
+        driven: Range<usize>,
+        target: Option<[f64; 2]>,
+    ) -> Self {
         let mut arm = Simulation::new(Arm::default(), Gains::default());
         arm.set_timestep(STEP.0 / 10.0);
         arm.set_state(state);
         let efforts = gravity_load(arm.arm(), &[0.0; 2]).map(|load| strength * load);
+        if driven.len() < 2 {
+            arm.set_limits(Limits {
+                effort: Some(from_fn(
+                    |i| if driven.contains(&i) { efforts[i] } else { 0.0 },
+                )),
+                ..Limits::default()
+            });
+        }
         let mut episode = Self {
             arm,
             target,
+            driven,
             efforts,
             hash: 0xcbf2_9ce4_8422_2325,
         };
@@ -187,9 +216,16 @@ impl Episode {
     }
 
     /// Takes a step, and returns its reward.
-    fn step(&mut self, action: [f64; 2]) -> f64 {
-        let effort = from_fn(|i| action[i].clamp(-1.0, 1.0) * self.efforts[i]);
-        self.arm.disturb(effort, STEP.0);
+    fn step(&mut self, action: &[f64]) -> f64 {
+        let mut effort = [0.0; 2];
+        for (joint, action) in self.driven.clone().zip(action) {
+            effort[joint] = action.clamp(-1.0, 1.0) * self.efforts[joint];
+        }
+        if self.driven.len() < 2 {
+            self.arm.drive(Some(effort));
+        } else {
+            self.arm.disturb(effort, STEP.0);
+        }
         self.arm.advance(STEP.1);
         let arm = self.arm.arm();
         let (reach, tip) = (
@@ -200,7 +236,7 @@ impl Episode {
             let away = [target[0] - tip.x, target[1] - tip.y];
             1.0 - (away[0] * away[0] + away[1] * away[1]).sqrt() / (2.0 * reach)
         });
-        self.chain(&action);
+        self.chain(action);
         self.chain_state();
         self.chain(&[reward]);
         reward

@@ -9,10 +9,8 @@ use pendularm::math::arm::{Arm as Rods, State};
 use pendularm::math::dynamics::energy;
 use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::forward;
-use pendularm::math::limits::Limits;
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::sensors::Sensors;
-use pendularm::math::simulation::{ControlPeriod, Simulation as Loop};
+use pendularm::math::simulation::Simulation as Loop;
 use pyo3::IntoPyObject;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyclass, pymethods};
 use pyo3::types::{PyBytes, PyDict};
@@ -103,6 +101,19 @@ fn begin<const N: usize>(
     one.set_limits(limits);
     one.set_sensors(sensors);
     Ok(Mutex::new(one))
+}
+
+/// Sets a field of what `$get` returns, by `$set`. The other fields do not change.
+macro_rules! set_field {
+    ($one:ident, $py:ident, $get:ident => $set:ident, $field:ident = $value:expr) => {
+        for_either!(&$one.own, one => {
+            let value = $value;
+            let mut one = hold($py, one);
+            let mut fields = one.$get().to_owned();
+            fields.$field = value;
+            one.$set(fields);
+        })
+    };
 }
 
 /// The default of an argument that is a name.
@@ -421,11 +432,7 @@ impl Simulation {
     #[setter]
     fn set_control_period(&self, py: Python<'_>, control_period: Real) -> PyResult<()> {
         let period = fields::number("control_period", control_period, Bound::NotNegative)?;
-        for_either!(&self.own, one => {
-            let mut one = hold(py, one);
-            let present = one.control_period();
-            one.set_control_period(ControlPeriod { period, ..present });
-        });
+        set_field!(self, py, control_period => set_control_period, period = period);
         Ok(())
     }
 
@@ -447,11 +454,7 @@ impl Simulation {
     #[setter]
     fn set_control_delay(&self, py: Python<'_>, control_delay: &Object<'_>) -> PyResult<()> {
         let delay = robot::delay(control_delay)?;
-        for_either!(&self.own, one => {
-            let mut one = hold(py, one);
-            let present = one.control_period();
-            one.set_control_period(ControlPeriod { delay, ..present });
-        });
+        set_field!(self, py, control_period => set_control_period, delay = delay);
         Ok(())
     }
 
@@ -465,12 +468,8 @@ impl Simulation {
 
     #[setter]
     fn set_effort_limit(&self, py: Python<'_>, effort_limit: &Object<'_>) -> PyResult<()> {
-        for_either!(&self.own, one => {
-            let effort = robot::limited(joints("effort_limit", effort_limit, Bound::Limit)?);
-            let mut one = hold(py, one);
-            let limits = *one.limits();
-            one.set_limits(Limits { effort, ..limits });
-        });
+        set_field!(self, py, limits => set_limits, effort =
+            robot::limited(joints("effort_limit", effort_limit, Bound::Limit)?));
         Ok(())
     }
 
@@ -483,11 +482,7 @@ impl Simulation {
     #[setter]
     fn set_anti_windup(&self, py: Python<'_>, anti_windup: Name) -> PyResult<()> {
         let anti_windup = robot::anti_windup(anti_windup)?;
-        for_either!(&self.own, one => {
-            let mut one = hold(py, one);
-            let limits = *one.limits();
-            one.set_limits(Limits { anti_windup, ..limits });
-        });
+        set_field!(self, py, limits => set_limits, anti_windup = anti_windup);
         Ok(())
     }
 
@@ -500,11 +495,7 @@ impl Simulation {
     #[setter]
     fn set_tracking_time(&self, py: Python<'_>, tracking_time: Real) -> PyResult<()> {
         let tracking_time = robot::tracking_time(tracking_time)?;
-        for_either!(&self.own, one => {
-            let mut one = hold(py, one);
-            let limits = *one.limits();
-            one.set_limits(Limits { tracking_time, ..limits });
-        });
+        set_field!(self, py, limits => set_limits, tracking_time = tracking_time);
         Ok(())
     }
 
@@ -516,12 +507,8 @@ impl Simulation {
 
     #[setter]
     fn set_encoder_step(&self, py: Python<'_>, encoder_step: &Object<'_>) -> PyResult<()> {
-        for_either!(&self.own, one => {
-            let encoder_step = joints("encoder_step", encoder_step, Bound::NotNegative)?;
-            let mut one = hold(py, one);
-            let sensors = *one.sensors();
-            one.set_sensors(Sensors { encoder_step, ..sensors });
-        });
+        set_field!(self, py, sensors => set_sensors, encoder_step =
+            joints("encoder_step", encoder_step, Bound::NotNegative)?);
         Ok(())
     }
 
@@ -534,11 +521,7 @@ impl Simulation {
     #[setter]
     fn set_velocity_source(&self, py: Python<'_>, velocity_source: Name) -> PyResult<()> {
         let velocity = robot::velocity_source(velocity_source)?;
-        for_either!(&self.own, one => {
-            let mut one = hold(py, one);
-            let sensors = *one.sensors();
-            one.set_sensors(Sensors { velocity, ..sensors });
-        });
+        set_field!(self, py, sensors => set_sensors, velocity = velocity);
         Ok(())
     }
 

@@ -1,6 +1,8 @@
-"""The adapters to stable-baselines3 and Ray. `make test-learning` installs both; without them these tests are skipped."""
+"""The adapters to stable-baselines3, RLlib and Ray. `make test-learning` installs them; without one its tests are skipped."""
 
 import importlib.util
+import os
+import secrets
 import sys
 import types
 from pathlib import Path
@@ -104,14 +106,53 @@ def test_two_seeds_differ_and_one_repeats(make):
     assert np.array_equal(env.reset(), first)
 
 
-@pytest.mark.skipif(not has_torch, reason="PPO needs torch")
-def test_ppo_learns_on_it(make):
-    from stable_baselines3 import PPO
-    from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+needs_torch = pytest.mark.skipif(not has_torch, reason="it needs torch")
 
-    env = VecNormalize(VecMonitor(make("Pendularm-v0", 16)))
+
+@needs_torch
+def test_the_arms_are_those_of_sb3s_own_vector_of_single_arms(make, name, links):
+    from stable_baselines3.common.env_checker import check_env
+    from stable_baselines3.common.env_util import make_vec_env
+
+    check_env(gymnasium.make(name, links=links))
+    ours = make(name, 3, links=links, max_episode_steps=7)
+    theirs = make_vec_env(name, 3, env_kwargs={"links": links, "max_episode_steps": 7})
+    first = [env.seed(7) and env.reset() for env in (ours, theirs)]
+    assert np.array_equal(*first)
+    random, ends = np.random.default_rng(1), 0
+    for _ in range(40):
+        actions = random.uniform(-1, 1, (3, *ours.action_space.shape)).astype(np.float32)
+        found, expected = ours.step(actions), theirs.step(actions)
+        for one, other in zip(found[:3], expected[:3], strict=True):
+            assert one.dtype == other.dtype
+            assert np.array_equal(one, other)
+        for one, other, done in zip(found[3], expected[3], found[2], strict=True):
+            assert one["TimeLimit.truncated"] == other["TimeLimit.truncated"]
+            if done:
+                assert np.array_equal(one["terminal_observation"], other["terminal_observation"])
+                ends += 1
+    assert ends >= 15
+
+
+@needs_torch
+def test_ppo_learns_through_the_wrappers_of_sb3(make, tmp_path):
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor, VecNormalize, VecVideoRecorder
+
+    arms = make("Pendularm-v0", 16, render_mode="rgb_array", max_episode_steps=20)
+    env = VecNormalize(VecMonitor(VecCheckNan(arms)))
+    env = VecVideoRecorder(env, str(tmp_path), lambda step: step == 0, video_length=10)
     model = PPO("MlpPolicy", env, n_steps=64, seed=0, device="cpu").learn(2048)
     assert model.num_timesteps >= 2048
+    assert {episode["l"] for episode in model.ep_info_buffer} == {20}
+    assert [file.stat().st_size > 1000 for file in tmp_path.glob("*.mp4")] == [True]
+
+
+class Stored:
+    """A reference to a value that Ray has."""
+
+    def __init__(self, value):
+        self.value = value
 
 
 class Remote:
@@ -125,14 +166,14 @@ class Remote:
 
         self.ray.calls.append(args)
         done = Future()
-        done.set_result(self.function(*(arg["stored"] if isinstance(arg, dict) else arg for arg in args)))
+        done.set_result(self.function(*(arg.value if isinstance(arg, Stored) else arg for arg in args)))
         return types.SimpleNamespace(future=lambda: done)
 
 
-def test_a_sweep_sends_its_grid_to_ray_once(monkeypatch):
+def test_a_sweep_sends_its_metric_to_ray_once(monkeypatch):
     ray = types.ModuleType("ray")
     ray.calls, ray.puts = [], []
-    ray.put = lambda thing: ray.puts.append(thing) or {"stored": thing}
+    ray.put = lambda thing: ray.puts.append(thing) or Stored(thing)
     ray.remote = lambda *function, **options: Remote(ray, *function) if function else lambda one: Remote(ray, one)
     monkeypatch.setitem(sys.modules, "ray", ray)
     ask = {"grid": {"kp": np.linspace(50, 500, 20)}, "metric": "final_error", "duration": 0.1, "piece": 3}
@@ -141,15 +182,54 @@ def test_a_sweep_sends_its_grid_to_ray_once(monkeypatch):
         assert np.array_equal(found["final_error"], pendularm.sweep(**ask)["final_error"])
     assert len(ray.puts) == 2
     assert len(ray.calls) == 14
-    assert all(isinstance(question, dict) for question, *_ in ray.calls)
+    assert all(isinstance(question, Stored) for question, *_ in ray.calls)
 
 
-def test_a_sweep_on_ray_has_the_same_bits():
+@pytest.fixture(scope="module")
+def ray():
+    """Ray with two workers, on loopback. It reads its token once per process."""
     ray = pytest.importorskip("ray")
-    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
-    try:
-        ask = {"grid": {"kp": np.linspace(50, 500, 40)}, "metric": "final_error", "duration": 0.2, "piece": 5}
-        found = pendularm.sweep(executor=pendularm.RayExecutor(num_cpus=1), **ask)
-        assert np.array_equal(found["final_error"], pendularm.sweep(**ask)["final_error"])
-    finally:
+    small = {"object_store_memory": 200_000_000, "include_dashboard": False, "log_to_driver": False}
+    with pytest.MonkeyPatch.context() as patch:
+        # Otherwise Ray writes a token to the home folder.
+        patch.setenv("RAY_AUTH_TOKEN", secrets.token_hex(32))
+        ray.init(num_cpus=2, _node_ip_address="127.0.0.1", **small)
+        yield ray
         ray.shutdown()
+
+
+def test_a_sweep_on_ray_has_the_same_bits_although_a_worker_is_lost(ray, tmp_path):
+    here, mark = os.getpid(), tmp_path / "lost"
+
+    def losing(run):
+        if os.getpid() != here and not mark.exists():
+            mark.touch()
+            os._exit(1)
+        return np.abs(run.positions[-1] - run.setpoint).max(axis=1)
+
+    ask = {"grid": {"kp": np.linspace(50, 500, 40)}, "metric": losing, "duration": 0.2, "piece": 5}
+    found = pendularm.sweep(executor=pendularm.RayExecutor(num_cpus=1), **ask)
+    assert mark.exists()
+    assert np.array_equal(found["metric"], pendularm.sweep(**ask)["metric"])
+
+
+# Warnings of Ray and of stable-baselines3 are theirs.
+@pytest.mark.filterwarnings("ignore")
+@needs_torch
+def test_rllib_collects_with_one_vector_environment_in_each_of_two_processes(ray):
+    ppo = pytest.importorskip("ray.rllib.algorithms.ppo")
+    config = (
+        ppo.PPOConfig()
+        .environment("pendularm.envs:Pendularm-v0", env_config={"threads": 1})
+        .env_runners(num_env_runners=2, num_envs_per_env_runner=16, gym_env_vectorize_mode="vector_entry_point")
+        .env_runners(rollout_fragment_length=64, num_cpus_per_env_runner=0.5)
+        .training(train_batch_size_per_learner=2048, minibatch_size=512, num_epochs=2)
+    )
+    algorithm = config.build_algo()
+    try:
+        assert algorithm.train()["env_runners"]["num_env_steps_sampled"] >= 2048
+        kind = lambda runner: (type(runner.env.unwrapped).__name__, runner.env.num_envs)
+        kinds = algorithm.env_runner_group.foreach_env_runner(kind, local_env_runner=False)
+        assert kinds == [("PendularmVectorEnv", 16)] * 2
+    finally:
+        algorithm.stop()

@@ -13,18 +13,20 @@ import pendularm
 import pendularm.envs
 
 PROGRAM = str(Path(sysconfig.get_path("scripts")) / "pendularm")
-TASKS = ["Pendularm-v0", "PendularmReach-v0"]
+MOTORS = {"Pendularm-v0": 2, "PendularmReach-v0": 2, "PendularmAcrobot-v0": 1, "PendularmPendubot-v0": 1}
+TASKS = list(MOTORS)
 
 
 def generated(count, seed=1):
     """Submissions with any seed, with and without an end by speed, and some of a policy."""
     random = np.random.default_rng(seed)
     for place in range(count):
-        task, start = TASKS[place % 2], int(random.integers(0, 2**32))
-        if place % 10 < 2:
+        task, start = TASKS[place % 4], int(random.integers(0, 2**32))
+        # An episode of one motor has 2000 steps.
+        if place % 10 < 2 and (MOTORS[task] == 2 or place < 80):
             yield pendularm.submission(task, start, "pump" if place % 20 < 10 else "rest")
             continue
-        actions = random.uniform(-1.5, 1.5, (int(random.integers(1, 40)), 2))
+        actions = random.uniform(-1.5, 1.5, (int(random.integers(1, 40)), MOTORS[task]))
         while True:
             try:
                 yield pendularm.submission(task, start, actions)
@@ -66,7 +68,7 @@ def test_a_thousand_submissions_agree_in_program_and_wheel(tmp_path):
         assert lines[place].endswith(": confirmed")
         # Python prints small numbers with another exponent.
         assert float(lines[place].removeprefix(start).removesuffix(": confirmed")) == pendularm.score(one)
-    assert min(steps) < 40 < max(steps) == 200
+    assert min(steps) < 40 < max(steps) == 2000
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -75,7 +77,7 @@ def test_the_score_is_that_of_gymnasiums_environment(task):
     for seed in [0, 7, 2**32 - 1]:
         env, total = gymnasium.make(task), 0.0
         env.reset(seed=seed)
-        actions = random.uniform(-0.3, 0.3, (30, 2)).astype(np.float32)
+        actions = random.uniform(-0.3, 0.3, (30, MOTORS[task])).astype(np.float32)
         for steps, action in enumerate(actions, 1):
             _, reward, terminated, *_ = env.step(action)
             total += reward
@@ -92,12 +94,12 @@ def changed(text, place):
 @pytest.mark.parametrize("task", TASKS)
 def test_one_changed_digit_is_refused_with_its_step(task, tmp_path):
     random = np.random.default_rng(4)
-    whole = pendularm.submission(task, 11, random.uniform(-0.5, 0.5, (25, 2)))
+    whole = pendularm.submission(task, 11, random.uniform(-0.5, 0.5, (25, MOTORS[task])))
     cases = [({**whole, "seed": 12}, 0), ({**whole, "score": changed(whole["score"], 15)}, 25)]
     cases.append(({**whole, "trail": whole["trail"][:-1]}, 25))
     cases.append(({**whole, "trail": [*whole["trail"], whole["trail"][0]]}, 25))
     for step in range(25):
-        for joint in range(2):
+        for joint in range(MOTORS[task]):
             actions = [list(row) for row in whole["actions"]]
             # Not the sign and the exponent, which may give no finite number.
             actions[step][joint] = changed(actions[step][joint], int(random.integers(3, 16)))
@@ -126,6 +128,7 @@ def test_what_is_no_submission_is_refused_by_both(tmp_path):
         ({**whole, "actions": [["+" + digits[1:], digits]] * 3}, "an action must be 16 hexadecimal digits of a finite"),
         ({**whole, "actions": [[digits[1:], digits]] * 3}, "an action must be 16 hexadecimal digits of a finite"),
         ({**whole, "actions": [[digits]] * 3}, "not a submission: "),
+        ({**whole, "task": "PendularmPendubot-v0"}, "not a submission: "),
         ({**whole, "seed": "3"}, "not a submission: "),
         ({**whole, "seed": -1}, ""),
         ({**whole, "seed": 2**32}, ""),
@@ -149,6 +152,8 @@ def test_what_is_no_submission_is_refused_by_both(tmp_path):
 
 
 def test_a_submission_ends_with_its_episode():
+    with pytest.raises(ValueError, match=r"^actions must be finite, with the shape \(steps, 1\), "):
+        pendularm.submission("PendularmAcrobot-v0", 0, np.ones((5, 2)))
     with pytest.raises(ValueError, match="^actions must end with the episode, after [0-9]+ steps, got 100$"):
         pendularm.submission("PendularmReach-v0", 0, np.ones((100, 2)))
     for wrong in [np.ones((3, 3)), np.ones(2), [[np.nan, 0]], [["1", "2"]], [[True, False]]]:

@@ -75,6 +75,33 @@ def test_neither_workers_nor_pieces_change_a_bit():
         assert np.array_equal(found["settling_time"], expected)
 
 
+class Weighing(ThreadPoolExecutor):
+    """Threads that count the bytes of each task, as an executor of processes sends them."""
+
+    def __init__(self):
+        super().__init__(1)
+        self.sent = []
+
+    def submit(self, fn, /, *args):
+        sent = pickle.dumps((fn, *args))
+        self.sent.append(len(sent))
+        return super().submit(*pickle.loads(sent))
+
+
+def test_a_value_of_the_grid_is_sent_only_with_the_pieces_that_use_it():
+    small = {**FIXED, "duration": 0.1, "samples": 2}
+    kp = np.geomspace(50, 2000, 3000)
+    for grid, piece in [({"kp": kp}, 10), ({"kd": [5.0, 80.0], "kp": kp, "method": ["verlet", "rk4"]}, 7)]:
+        expected = pendularm.sweep(grid, "final_error", **small)["final_error"]
+        with Weighing() as executor:
+            found = pendularm.sweep(grid, "final_error", executor=executor, piece=piece, **small)
+        assert np.array_equal(found["final_error"], expected)
+        few = {name: values[:piece] for name, values in grid.items()}
+        with Weighing() as alone:
+            pendularm.sweep(few, "final_error", executor=alone, piece=piece, **small)
+        assert max(executor.sent) < max(alone.sent) + 200 < kp.nbytes / 10
+
+
 def test_threads_are_as_many_as_cores():
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     before, most = threading.active_count(), 0

@@ -25,6 +25,7 @@ IN_FLIGHT = 256
 
 def hand_out(
     question: object,
+    cut: Callable[[int, int], object],
     total: int,
     starts: Sequence[int],
     piece: int,
@@ -34,8 +35,8 @@ def hand_out(
     kept: "Folder | None",
     progress: bool,
 ) -> None:
-    """Submits the pieces that begin at `starts`, each a `solve` of the sweep over a range of settings, and collects
-    each result on arrival. A worker with another wheel is refused."""
+    """Submits the pieces that begin at `starts`, each a `solve` of the question for a range of settings, with the values
+    that `cut` returns for this range. Collects each result on arrival. A worker with another wheel is refused."""
     left = iter(starts)
     under_way: dict[Future[Any], int] = {}
     already = total - sum(min(piece, total - start) for start in starts)
@@ -43,7 +44,8 @@ def hand_out(
         try:
             while True:
                 while len(under_way) < IN_FLIGHT and (start := next(left, None)) is not None:
-                    under_way[executor.submit(solve, question, start, min(start + piece, total))] = start
+                    stop = min(start + piece, total)
+                    under_way[executor.submit(solve, question, cut(start, stop), start, stop)] = start
                 if not under_way:
                     return
                 ended = wait(under_way, return_when=FIRST_COMPLETED).done

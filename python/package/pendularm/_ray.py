@@ -8,7 +8,7 @@ from typing import Any
 class RayExecutor:
     """Runs the pieces of a sweep on Ray: ``sweep(grid, metric, executor=RayExecutor())``.
 
-    `options` are those of `ray.remote`, such as `num_cpus=1`. Each worker needs the same wheel. The grid is sent to
+    `options` are those of `ray.remote`, such as `num_cpus=1`. Each worker needs the same wheel. The metric is sent to
     Ray once, and each node fetches it once. Ray repeats a piece whose worker was lost.
     """
 

@@ -198,3 +198,12 @@ class Reach(Task):
 
     def goals(self) -> Floats:
         return self.targets
+
+
+TASKS: dict[str, type[Task]] = {
+    "Pendularm": SwingUp,
+    "PendularmReach": Reach,
+    "PendularmAcrobot": Acrobot,
+    "PendularmPendubot": Pendubot,
+}
+"""By the names of the environments, without their version."""

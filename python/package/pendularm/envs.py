@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ._fields import Floats, Method, as_array, promised, read_seeds, shown, whole_number
 from ._native import is_masked
 from ._render import METADATA, Frame, Renderer
-from ._tasks import TIMESTEP, Acrobot, Action, Observation, Pendubot, Reach, SwingUp, Task
+from ._tasks import TASKS, TIMESTEP, Acrobot, Action, Observation, Pendubot, Reach, SwingUp, Task
 
 __all__ = [
     "PendularmAcrobotEnv",
@@ -460,13 +460,7 @@ class PendularmPendubotVectorEnv(_Vector):
     task_of = Pendubot
 
 
-_TASKS: dict[str, type[Task]] = {
-    "Pendularm": SwingUp,
-    "PendularmReach": Reach,
-    "PendularmAcrobot": Acrobot,
-    "PendularmPendubot": Pendubot,
-}
-for _name, _task in _TASKS.items():
+for _name, _task in TASKS.items():
     gymnasium.register(
         f"{_name}-v0",
         entry_point=f"pendularm.envs:{_name}Env",

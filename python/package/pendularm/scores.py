@@ -10,14 +10,18 @@ It needs Gymnasium, as `pendularm.envs` does.
 import json
 import os
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._fields import Floats, numbers, path, promised, shown, whole_number
+
+if TYPE_CHECKING:
+    from ._tasks import Task
 
 __all__ = ["score", "submission"]
 
@@ -26,17 +30,18 @@ Submission = dict[str, str | int | list[str] | list[list[str]]]
 POLICIES = {"rest": 0.0, "pump": 1.0}
 
 MOST_BYTES = 1 << 20
-"""Most bytes of a submission. The longest episode has some 20,000."""
+"""Most bytes of a submission. The longest episode has some 80,000."""
 
 
 def submission(task: str, seed: int, actions: ArrayLike | str) -> Submission:
-    """The submission of an episode of a single environment: `task` is `Pendularm-v0` or `PendularmReach-v0`, reset with
-    `seed`, below 2^32, and then stepped with each row of `actions`, (steps, 2), or by a policy. `json.dump` writes it.
+    """The submission of an episode of a single environment: `task` is the name of one of the four, reset with `seed`, below
+    2^32, and then stepped with each row of `actions`, (steps, motors), or by a policy. `json.dump` writes it.
 
     The episode ends with the actions, or when the task ends it. Raises `ValueError` for further actions.
     """
-    rows = actions if isinstance(actions, str) else _rows(actions)
-    found, steps = _played(task, seed, rows)
+    played = _task(task)
+    rows = actions if isinstance(actions, str) else _rows(actions, played.efforts.size)
+    found, steps = _played(task, played, seed, rows)
     if not isinstance(rows, str) and len(rows) > steps:
         raise ValueError(f"actions must end with the episode, after {steps} steps, got {len(rows)}")
     return found
@@ -53,10 +58,11 @@ def score(file: str | os.PathLike[str] | Mapping[str, object]) -> float:
     if given["version"] != version("pendularm"):
         raise ValueError(f"made by another version, {given['version']!r}")
     actions, trail, task, seed = given["actions"], given["trail"], given["task"], given["seed"]
-    rows = actions if isinstance(actions, str) else np.array([[_double(one) for one in row] for row in _listed(actions)])
     if not isinstance(task, str) or not isinstance(seed, int) or not isinstance(trail, list):
         raise ValueError("not a submission: task must be a text, seed a whole number, and trail a list")
-    found, steps = _played(task, seed, rows)
+    played = _task(task)
+    rows: Floats | str = actions if isinstance(actions, str) else _doubles(actions, played.efforts.size)
+    found, steps = _played(task, played, seed, rows)
     expected = found["trail"]
     assert isinstance(expected, list)
     departs = next((step for step, one in enumerate(expected) if trail[step : step + 1] != [one]), None)
@@ -79,22 +85,22 @@ def _parsed(file: Path) -> Mapping[str, object]:
     return given
 
 
-def _rows(actions: ArrayLike) -> Floats:
+def _rows(actions: ArrayLike, motors: int) -> Floats:
     try:
         rows = numbers(actions)
     except (TypeError, ValueError, OverflowError) as why:
         kind = TypeError if isinstance(why, TypeError) else ValueError
         raise kind(f"actions must be an array of numbers, or a policy, got {shown(actions)}") from None
-    if rows.ndim != 2 or rows.shape[1] != 2 or not np.isfinite(rows).all():
-        raise ValueError(f"actions must be finite, with the shape (steps, 2), got {shown(actions)}")
+    if rows.ndim != 2 or rows.shape[1] != motors or not np.isfinite(rows).all():
+        raise ValueError(f"actions must be finite, with the shape (steps, {motors}), got {shown(actions)}")
     return rows
 
 
-def _listed(actions: object) -> Sequence[Sequence[object]]:
-    is_listed = isinstance(actions, list) and all(isinstance(row, list) and len(row) == 2 for row in actions)
+def _doubles(actions: object, motors: int) -> Floats:
+    is_listed = isinstance(actions, list) and all(isinstance(row, list) and len(row) == motors for row in actions)
     if not isinstance(actions, list) or not is_listed:
-        raise ValueError(f"not a submission: actions must be rows of two texts, or a policy, got {shown(actions)}")
-    return actions
+        raise ValueError(f"not a submission: actions must be rows of {motors} texts, or a policy, got {shown(actions)}")
+    return np.array([[_double(one) for one in row] for row in actions])
 
 
 def _digits(number: float) -> str:
@@ -119,30 +125,34 @@ def _chained(link: int, *numbers: NDArray[np.float64]) -> int:
     return link
 
 
-@promised
-def _played(task: str, seed: int, actions: Floats | str) -> tuple[Submission, int]:
-    """The submission of an episode with these actions, until its end, and its steps."""
-    from ._tasks import TIMESTEP, Reach, SwingUp
+def _task(name: str) -> "Task":
+    """One arm with a task."""
+    from ._tasks import TASKS, TIMESTEP
 
-    tasks = {"Pendularm-v0": SwingUp, "PendularmReach-v0": Reach}
-    if task not in tasks:
-        raise ValueError(f"no task {task!r}")
+    tasks = {f"{name}-v0": task for name, task in TASKS.items()}
+    if name not in tasks:
+        raise ValueError(f"no task {name!r}")
+    return tasks[name](1, 2, 1, "rk4", TIMESTEP)
+
+
+@promised
+def _played(task: str, played: "Task", seed: int, actions: Floats | str) -> tuple[Submission, int]:
+    """The submission of an episode with these actions, until its end, and its steps."""
     seed = whole_number("seed", seed)
     if not 0 <= seed < 2**32:
         raise ValueError(f"seed must be at least 0 and less than 2^32, got {shown(seed)}")
     if isinstance(actions, str) and actions not in POLICIES:
         raise ValueError(f"no policy {actions!r}")
-    played = tasks[task](1, 2, 1, "rk4", TIMESTEP)
     batch, most = played.batch, played.most_steps
     if not isinstance(actions, str) and len(actions) > most:
         raise ValueError(f"more than {most} actions")
     played.begin([0], [np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed)))])
-    target = played.targets if isinstance(played, Reach) else np.empty(0)
+    target = getattr(played, "targets", np.empty(0))
     link = _chained(0xCBF29CE484222325, target, batch.position, batch.velocity)
     trail, total, steps = [f"{link:016x}"], 0.0, 0
     while steps < (most if isinstance(actions, str) else len(actions)) and not played.lost()[0]:
         if isinstance(actions, str):
-            action = np.where(batch.velocity >= 0, POLICIES[actions], -POLICIES[actions])
+            action = np.where(batch.velocity[:, played.driven] >= 0, POLICIES[actions], -POLICIES[actions])
         else:
             action = actions[steps : steps + 1]
         played.go_on(action)

@@ -73,6 +73,9 @@ class Run:
     """(arms,)."""
 
 
+Columns = dict[str, NDArray[Any]]
+"""Values of settings by their names, each with a row per value."""
+
 Metric = Callable[[Run], NDArray[Any] | Mapping[str, NDArray[Any]]]
 """One number per arm, or several by name. It must not mix the arms."""
 
@@ -204,8 +207,9 @@ def sweep(
         raise TypeError(f"executor must have submit, as in concurrent.futures, got {shown(executor)}")
     folder = None if folder is None else path("folder", folder)
     progress = flag("progress", progress)
+    columns = {name: column(name, values, links) for name, values in axes.items()}
     question = _Question(
-        axes={name: column(name, values, links) for name, values in axes.items()},
+        shape=tuple(len(values) for values in axes.values()),
         fixed={name: column(name, [value], links) for name, value in settings.items()},
         metric=metric,
         links=links,
@@ -213,20 +217,22 @@ def sweep(
         samples=samples,
         controller=flag("controller", controller),
     )
-    question.check()
+    question.check(columns)
     kept = None
     if folder is not None:
-        kept = Folder(folder, question.to_keep(), total, piece, metric if isinstance(metric, str) else None)
+        kept = Folder(folder, question.to_keep(columns), total, piece, metric if isinstance(metric, str) else None)
     starts = range(0, total, piece)
     done = {} if kept is None else kept.read(starts)
     left = [start for start in starts if start not in done]
+    cut = partial(_cut, columns, question.shape)
     if executor is not None:
-        hand_out(question, total, left, piece, executor, _solve, done, kept, progress)
+        hand_out(question, cut, total, left, piece, executor, _solve, done, kept, progress)
     else:
         stopped = threading.Event()
         with _Threads(_cores()) as threads:
             try:
-                hand_out(question, total, left, piece, threads, partial(_solve, stopped=stopped), done, kept, progress)
+                solve = partial(_solve, stopped=stopped)
+                hand_out(question, cut, total, left, piece, threads, solve, done, kept, progress)
             finally:
                 # A caller that stops early, for example by Ctrl-C, does not wait for running
                 # pieces.
@@ -257,23 +263,19 @@ def _cores() -> int:
 
 @dataclass(frozen=True)
 class _Question:
-    """The task for every setting, which is sent to the workers."""
+    """The task for every setting, which is sent to the workers. A piece has its own values of the axes."""
 
-    axes: dict[str, Any]
-    fixed: dict[str, Any]
+    shape: tuple[int, ...]
+    fixed: Columns
     metric: str | Metric
     links: int
     duration: float
     samples: int
     controller: bool
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return tuple(len(values) for values in self.axes.values())
-
-    def check(self) -> None:
+    def check(self, axes: Columns) -> None:
         """Tries every value once, so a bad one is refused here by its name."""
-        settings = {**self.axes, **self.fixed}
+        settings = {**axes, **self.fixed}
         for name, values in settings.items():
             try_values(name, values, self.links)
         timesteps = settings.get("timestep", [TIMESTEP])
@@ -284,7 +286,7 @@ class _Question:
         if steps > MOST_STEPS:
             raise ValueError(f"duration / timestep must be at most {MOST_STEPS} steps, got {steps:g}")
 
-    def to_keep(self) -> dict[str, Any]:
+    def to_keep(self, axes: Columns) -> dict[str, Any]:
         """The description of the sweep in the folder."""
         metric = self.metric
         if not isinstance(metric, str):
@@ -293,7 +295,7 @@ class _Question:
         return {
             "version": version("pendularm"),
             # A list, because the order counts: the axes of the results have the order of the grid.
-            "grid": [[name, values.tolist()] for name, values in self.axes.items()],
+            "grid": [[name, values.tolist()] for name, values in axes.items()],
             "settings": {name: values.tolist() for name, values in self.fixed.items()},
             "metric": metric,
             "links": self.links,
@@ -320,19 +322,29 @@ def _advance(batch: Batch, steps: NDArray[np.int64], stopped: threading.Event | 
             return
 
 
+def _cut(axes: Columns, shape: tuple[int, ...], start: int, stop: int) -> Columns:
+    """The values of each axis that a piece uses, each once, in their order."""
+    places = np.unravel_index(np.arange(start, stop), shape)
+    return {name: values[np.unique(place)] for (name, values), place in zip(axes.items(), places, strict=True)}
+
+
 @promised
 def _solve(
-    question: _Question, start: int, stop: int, stopped: threading.Event | None = None
+    question: _Question, axes: Columns, start: int, stop: int, stopped: threading.Event | None = None
 ) -> tuple[str, PieceResults]:
     """Computes one piece on any worker, and names the worker's wheel. In this process it ends soon after `stopped` is
     set."""
-    return BUILD, _values(question, start, stop, stopped)
+    return BUILD, _values(question, axes, start, stop, stopped)
 
 
-def _values(question: _Question, start: int, stop: int, stopped: threading.Event | None) -> PieceResults:
+def _values(
+    question: _Question, axes: Columns, start: int, stop: int, stopped: threading.Event | None
+) -> PieceResults:
     places = np.unravel_index(np.arange(start, stop), question.shape)
     arms = stop - start
-    settings = {name: values[place] for (name, values), place in zip(question.axes.items(), places, strict=True)}
+    # The axes have each used value once (`_cut`).
+    rows = [np.unique(place, return_inverse=True)[1] for place in places]
+    settings = {name: values[row] for (name, values), row in zip(axes.items(), rows, strict=True)}
     settings |= {name: np.repeat(values, arms, axis=0) for name, values in question.fixed.items()}
     batch = begin(settings, arms, question.links)
     batch.enable(question.controller)

@@ -137,21 +137,29 @@ impl<const N: usize> Hold<N> {
     ) -> Self {
         let steps = held.period.steps(timestep);
         let remembers = held.period.delay > 1 || !sensors.are_exact();
-        Self {
+        let mut hold = Self {
             steps,
             length: in_f64(steps) * timestep,
-            every_step: steps == 1
-                && held.period.delay == 0
-                && held.driven.is_none()
-                && limits.are_absent()
-                && !remembers
-                && held.command.iter().all(|effort| effort.to_bits() == 0),
+            every_step: false,
             held,
             limits,
             sensors,
             memory: if remembers { memory } else { Memory::default() },
             remembers,
-        }
+        };
+        hold.every_step = hold.runs_every_step();
+        hold
+    }
+
+    /// The value of `every_step`.
+    fn runs_every_step(&self) -> bool {
+        let held = &self.held;
+        self.steps == 1
+            && held.period.delay == 0
+            && held.driven.is_none()
+            && self.limits.are_absent()
+            && !self.remembers
+            && held.command.iter().all(|effort| effort.to_bits() == 0)
     }
 
     /// What is remembered between two runs of the law.
@@ -194,6 +202,15 @@ impl<const N: usize> Hold<N> {
     /// The arm is in another state, so a difference to the old one is no velocity.
     pub(super) fn forget_measurement(&mut self) {
         self.memory.measured = None;
+    }
+
+    /// Sets or ends the effort that replaces the others \[N m\]. A period begins with the next step, as in
+    /// [`Hold::begin_period`], but nothing is copied: a batch does this for each arm of each call.
+    pub(super) fn drive(&mut self, effort: Option<[f64; N]>) {
+        self.held.due = 0;
+        self.held.driven = effort;
+        self.memory.measured = None;
+        self.every_step = self.runs_every_step();
     }
 
     /// Sets the clients' effort \[N m\].

@@ -431,8 +431,7 @@ impl<const N: usize> Simulation<N> {
     /// Applies `effort` \[N m\] from the next step on, in place of the controller's and of commands; `None` ends
     /// this. The controller does not run meanwhile. A control period begins afterwards.
     pub fn drive(&mut self, effort: Option<[f64; N]>) {
-        let change = |held: &mut Held<N>| held.driven = effort;
-        self.hold.begin_period(self.timestep, change);
+        self.hold.drive(effort);
     }
 
     /// The limits of the motors.
