@@ -114,8 +114,8 @@ serve() { # name, frames to send first, subscribers of /joint_states
         rm -f "$counts"*
         return
     fi
-    put "$name-encoded" "$(awk "BEGIN { print $(calls_of 'messages::publish$' "$counts".1) / $seconds }")" "messages per second"
-    put "$name-json" "$(awk "BEGIN { printf \"%.0f\", $(of_functions 'serde_json|zmij|messages::publish' "$counts".1) / $seconds }")" "instructions per second"
+    put "$name-encoded" "$(awk "BEGIN { print $(calls_of 'messages::frames::publish$' "$counts".1) / $seconds }")" "messages per second"
+    put "$name-json" "$(awk "BEGIN { printf \"%.0f\", $(of_functions 'serde_json|zmij|messages::frames' "$counts".1) / $seconds }")" "instructions per second"
     rm -f "$counts"*
     put "$name" "$(awk "BEGIN { printf \"%.0f\", ${total:-0} / $seconds }")" "instructions per second"
 }
@@ -125,6 +125,7 @@ if command -v callgrind_control >/dev/null; then
 ' 0
     serve server-1-subscriber "" 1
     serve server-11-subscribers "" 11
+    grep -q '^server-1-subscriber-encoded,0,' "$scratch/work.csv" && { echo "measure-work: the functions that encode have other names now" >&2; exit 1; }
 fi
 
 # Timers: the number of wake-ups of the gateway's thread, which runs goals and trials. Nothing else happens there.

@@ -77,14 +77,13 @@ impl<const N: usize> Sensors<N> {
     #[must_use]
     pub fn measured(&self, state: &State<N>, before: Option<&State<N>>, period: f64) -> State<N> {
         let mut position = state.position;
-        for i in 0..N {
-            let step = self.encoder_step[i];
-            if step > 0.0 {
-                let counted = (position[i] / step).round() * step;
-                position[i] = if counted.is_finite() {
+        for (position, step) in position.iter_mut().zip(&self.encoder_step) {
+            if *step > 0.0 {
+                let counted = (*position / step).round() * step;
+                *position = if counted.is_finite() {
                     counted
                 } else {
-                    position[i]
+                    *position
                 };
             }
         }

@@ -107,6 +107,22 @@ pub struct After<const N: usize> {
     ran: Option<(State<N>, [f64; N])>,
 }
 
+/// The value of [`Hold::every_step`].
+#[inline(always)]
+fn runs_every_step<const N: usize>(
+    steps: u64,
+    held: &Held<N>,
+    limits: &Limits<N>,
+    remembers: bool,
+) -> bool {
+    steps == 1
+        && held.period.delay == 0
+        && held.driven.is_none()
+        && limits.are_absent()
+        && !remembers
+        && held.command.iter().all(|effort| effort.to_bits() == 0)
+}
+
 /// The held effort, with values computed from it and the timestep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hold<const N: usize> {
@@ -137,29 +153,16 @@ impl<const N: usize> Hold<N> {
     ) -> Self {
         let steps = held.period.steps(timestep);
         let remembers = held.period.delay > 1 || !sensors.are_exact();
-        let mut hold = Self {
+        Self {
             steps,
             length: in_f64(steps) * timestep,
-            every_step: false,
+            every_step: runs_every_step(steps, &held, &limits, remembers),
             held,
             limits,
             sensors,
             memory: if remembers { memory } else { Memory::default() },
             remembers,
-        };
-        hold.every_step = hold.runs_every_step();
-        hold
-    }
-
-    /// The value of `every_step`.
-    fn runs_every_step(&self) -> bool {
-        let held = &self.held;
-        self.steps == 1
-            && held.period.delay == 0
-            && held.driven.is_none()
-            && self.limits.are_absent()
-            && !self.remembers
-            && held.command.iter().all(|effort| effort.to_bits() == 0)
+        }
     }
 
     /// What is remembered between two runs of the law.
@@ -210,7 +213,7 @@ impl<const N: usize> Hold<N> {
         self.held.due = 0;
         self.held.driven = effort;
         self.memory.measured = None;
-        self.every_step = self.runs_every_step();
+        self.every_step = runs_every_step(self.steps, &self.held, &self.limits, self.remembers);
     }
 
     /// Sets the clients' effort \[N m\].
