@@ -276,7 +276,7 @@ fn a_method_of_ones_own_is_refused_with_the_reason() {
     in_virtual_time(async {
         let mut both = Both::<2>::start().await;
         let euler = json!({"tableau": {"a": [[]], "b": [1]}, "duration": 0.1, "error": 0.1});
-        for service in ["/study/method", "/study/rollout", "/study/plan"] {
+        for service in ["/study/method", "/study/rollout"] {
             let (theirs, ours) = both.call(service, euler.clone()).await;
             assert_eq!(theirs[0]["result"], true, "{service}: {theirs}");
             assert_eq!(ours[0]["result"], false, "{service}: {ours}");

@@ -1,4 +1,4 @@
-// Compares 16 runs of the kernel in the page and 16 answers of it with native ones, to the bit: `runs.mjs NATIVE.txt pendularm.html`.
+// Compares 16 runs of the kernel in the page and 14 answers of it with native ones, to the bit: `runs.mjs NATIVE.txt pendularm.html`.
 
 import { readFileSync } from "node:fs";
 
@@ -12,8 +12,8 @@ const { memory, compare, output } = instance.exports;
 const length = compare();
 const ours = Buffer.from(memory.buffer, output(), length).toString();
 const lines = native.trim().split("\n").length;
-if (lines !== 32 || ours !== native) {
+if (lines !== 30 || ours !== native) {
   console.error(`${lines} native lines:\n${native}\nthe kernel's:\n${ours}`);
   process.exit(1);
 }
-console.log("16 runs and 16 answers of the kernel have the bits of the native ones");
+console.log("16 runs and 14 answers of the kernel have the bits of the native ones");

@@ -13,7 +13,7 @@ use pendularm::math::simulation::Simulation;
 use crate::Kernel;
 
 /// Calls of the study and of inverse kinematics whose answers are also compared: the service and its arguments.
-const QUESTIONS: [(&str, &str); 8] = [
+const QUESTIONS: [(&str, &str); 7] = [
     ("/study/stability", "{}"),
     (
         "/study/stability",
@@ -28,7 +28,6 @@ const QUESTIONS: [(&str, &str); 8] = [
         "/study/rollout",
         r#"{"reference":true,"samples":20,"duration":3}"#,
     ),
-    ("/study/plan", r#"{"error":0.001,"duration":1}"#),
     ("/ik/solve", r#"{"x":0.7,"y":0.9,"phi":0.4}"#),
     ("/ik/solve", r#"{"x":-0.31,"y":-1.27,"phi":2.4}"#),
 ];

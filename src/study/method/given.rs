@@ -83,6 +83,7 @@ impl Given {
     }
 
     /// The embedded method.
+    #[cfg(feature = "report")]
     pub(crate) const fn embedded(&self) -> Option<&Pair> {
         self.embedded.as_ref()
     }

@@ -14,7 +14,7 @@ use pendularm::services::arm::{
 };
 use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
 use pendularm::services::study::{
-    Computed, FindHeldLimit, PlanRun, PredictStability, Present, RunOffline, SuggestGains, Work,
+    Computed, FindHeldLimit, PredictStability, Present, RunOffline, SuggestGains, Work,
 };
 use pendularm::services::trial::TrialRequest;
 use pendularm::services::{Address, Ask, NoService};
@@ -90,10 +90,7 @@ impl<const N: usize> Kernel<N> {
                 self.begin::<SuggestGains<N>, _>(own, &args, to, Computed::work);
             }
             Service::Method => self.send(to.failure(OWN_METHOD)),
-            Service::Plan | Service::Rollout if has_tableau(own, &args) => {
-                self.send(to.failure(OWN_METHOD));
-            }
-            Service::Plan => self.begin::<PlanRun<N>, _>(own, &args, to, Computed::work),
+            Service::Rollout if has_tableau(own, &args) => self.send(to.failure(OWN_METHOD)),
             Service::Rollout => self.begin::<RunOffline<N>, _>(own, &args, to, Repeated::new),
             _ => self.send(to.failure(&NoService::NotServed(to.name().to_owned()).to_string())),
         }
