@@ -45,9 +45,11 @@ def test_it_opens_in_a_browser(monkeypatch):
 
 def test_the_settings_are_those_of_a_link():
     source = (Path(__file__).parents[2] / "page/settings.js").read_text(encoding="utf-8")
-    reader = source[source.index("export function fromFragment") :]
-    reader = reader[: reader.index("\n}\n")]
-    assert all(f'"{name}"' in reader for name in SETTINGS)
+    table = source[source.index("const IN_LINKS = [") :]
+    table = table[: table.index("\n];\n")]
+    assert tuple(re.findall(r'\["(\w+)", "', table)) == SETTINGS
+    shown = pendularm.page(effort_limit=None, encoder_step=[0.001, 0], velocity_sensor="difference", control_delay=1)
+    assert shown.fragment == "links=2&effort_limit=none&encoder_step=0.001,0.0&velocity_sensor=difference&control_delay=1.0"
 
 
 @pytest.mark.parametrize(

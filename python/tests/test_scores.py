@@ -54,7 +54,10 @@ def by_wheel(submission):
 
 def test_the_kept_submissions_of_the_page_are_the_first_ones():
     kept = Path(__file__).parents[2] / "tests/data/submissions.jsonl"
-    assert kept.read_text(encoding="utf-8").splitlines() == [json.dumps(one) for one in generated(20)]
+    lines = kept.read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 20
+    for place, (line, one) in enumerate(zip(lines, generated(20), strict=True)):
+        assert line == json.dumps(one), f"submission {place} is another one now: keep those of generated(20)"
 
 
 def test_a_thousand_submissions_agree_in_program_and_wheel(tmp_path):

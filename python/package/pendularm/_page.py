@@ -10,11 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-Setting = float | str | bool | Sequence[float]
+Setting = float | str | bool | Sequence[float] | None
 
 #: The names of the settings in a link of the page.
 SETTINGS = (
-    "method", "timestep", "gravity", "masses", "lengths", "kp", "ki", "kd", "period", "delay", "controller", "setpoint",
+    "method", "timestep", "gravity", "masses", "lengths", "kp", "ki", "kd", "period", "delay", "controller", "viscous",
+    "effort_limit", "anti_windup", "tracking_time", "encoder_step", "velocity_sensor", "control_delay", "setpoint",
     "position", "velocity",
 )  # fmt: skip
 
@@ -22,10 +23,12 @@ SETTINGS = (
 def _text(name: str, value: Setting) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
+    if value is None and name == "effort_limit":
+        return "none"
     if isinstance(value, str):
         return value
     try:
-        return ",".join(repr(float(one)) for one in value) if isinstance(value, Sequence) else repr(float(value))
+        return ",".join(repr(float(one)) for one in value) if isinstance(value, Sequence) else repr(float(value))  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise TypeError(f"{name} must be a number, a text, or a sequence of numbers") from None
 
@@ -64,8 +67,8 @@ def page(step: int | str | None = None, *, links: int = 2, height: int = 620, **
     """The page of the runtime with an arm of its own. It needs no server and no network.
 
     ``step`` opens that step of the course; without it, a setting opens the Workbench. The settings are those of a link that *Share* copies, with
-    the same names: ``page(method="euler", timestep=0.01, kp=[900, 200], controller=True)``. `True` and `False` are *on* and *off*. The page offers
-    them, applies them after a click on *Apply*, and says what is wrong with them.
+    the same names: ``page(method="euler", timestep=0.01, kp=[900, 200], controller=True)``. `True` and `False` are *on* and *off*, and
+    `None` is no limit of the effort. The page offers them, applies them after a click on *Apply*, and says what is wrong with them.
 
     Raises `TypeError` for an unknown setting, and `ValueError` if ``links`` is not 2 or 3.
     """
