@@ -6,7 +6,7 @@
 //! **Invariant:** no byte is read more than three times. At most one incomplete frame and the last chunk are kept.
 
 pub use super::fault::{FrameError, KEPT_START};
-use super::fault::{Refused, not_utf8};
+use super::fault::{Refused, not_an_object, not_utf8, start_of};
 use super::literals::accept_literals;
 pub use super::opening::{Foreign, Opening, is_host_line, opening};
 use super::series::{self, Series};
@@ -275,6 +275,25 @@ pub struct RawFrame {
 }
 
 impl RawFrame {
+    /// A message that came over WebSocket or in pieces. It may be pretty-printed.
+    #[must_use]
+    pub const fn of_message(bytes: Vec<u8>) -> Self {
+        Self {
+            bytes,
+            has_literals: None,
+        }
+    }
+
+    /// Removes the white space around the message. Returns whether its object may contain `NaN` or `Infinity`; `None`
+    /// if there is only white space.
+    fn scan_message(&mut self) -> Option<Result<bool, Refused>> {
+        self.bytes.truncate(self.bytes.trim_ascii_end().len());
+        let space = self.bytes.len() - self.bytes.trim_ascii_start().len();
+        self.bytes.drain(..space);
+        let scanned = (!self.bytes.is_empty()).then(|| one_object(&self.bytes))?;
+        Some(scanned.map_err(|error| (error, start_of(&self.bytes))))
+    }
+
     /// Its length in bytes.
     #[must_use]
     #[allow(clippy::len_without_is_empty, reason = "only a message may be empty")]
@@ -299,6 +318,28 @@ impl RawFrame {
             Ok(text) if has_literals => Ok(accept_literals(text)),
             text => text,
         })
+    }
+}
+
+/// Whether the object in `text`, if there is one, may contain `NaN` or `Infinity`.
+fn one_object(text: &[u8]) -> Result<bool, FrameError> {
+    if !text.starts_with(b"{") {
+        let line = text.split(|byte| *byte == b'\n').next();
+        return Err(not_an_object(line.unwrap_or_default()));
+    }
+    let mut nesting = Nesting::new();
+    let mut rest = text;
+    loop {
+        let (scanned, end) = nesting.scan(rest);
+        rest = rest.get(scanned..).unwrap_or_default();
+        match end {
+            Some(Ok(())) if rest.is_empty() => return Ok(nesting.has_literals),
+            Some(Ok(())) => return Err(FrameError::MoreBehind),
+            // The newline, which is unscanned, is white space between tokens.
+            Some(Err(FrameError::LineEnded)) => rest = rest.get(1..).unwrap_or_default(),
+            Some(Err(error)) => return Err(error),
+            None => return Err(FrameError::LineEnded),
+        }
     }
 }
 

@@ -11,8 +11,8 @@ use std::collections::VecDeque;
 
 use bytes::{Buf, BufMut, Bytes, BytesMut};
 
-use super::fault::{Refused, not_an_object, start_of};
-use super::frame::{FrameError, FramePart, Nesting, RawFrame, append};
+use super::fault::start_of;
+use super::frame::{FrameError, FramePart, RawFrame, append};
 use crate::protocol::limits::MAX_FRAME;
 
 /// The kinds of frames.
@@ -291,49 +291,6 @@ fn unmask(payload: &mut [u8], mask: &mut [u8; 4]) {
 }
 
 // ---- a message, which is one object ---------------------------------------------------------------------------------
-
-impl RawFrame {
-    /// A message that came over WebSocket or in pieces. It may be pretty-printed.
-    #[must_use]
-    pub const fn of_message(bytes: Vec<u8>) -> Self {
-        Self {
-            bytes,
-            has_literals: None,
-        }
-    }
-
-    /// Removes the white space around the message. Returns whether its object may contain `NaN` or `Infinity`; `None`
-    /// if there is only white space.
-    pub(super) fn scan_message(&mut self) -> Option<Result<bool, Refused>> {
-        self.bytes.truncate(self.bytes.trim_ascii_end().len());
-        let space = self.bytes.len() - self.bytes.trim_ascii_start().len();
-        self.bytes.drain(..space);
-        let scanned = (!self.bytes.is_empty()).then(|| one_object(&self.bytes))?;
-        Some(scanned.map_err(|error| (error, start_of(&self.bytes))))
-    }
-}
-
-/// Whether the object in `text`, if there is one, may contain `NaN` or `Infinity`.
-fn one_object(text: &[u8]) -> Result<bool, FrameError> {
-    if !text.starts_with(b"{") {
-        let line = text.split(|byte| *byte == b'\n').next();
-        return Err(not_an_object(line.unwrap_or_default()));
-    }
-    let mut nesting = Nesting::new();
-    let mut rest = text;
-    loop {
-        let (scanned, end) = nesting.scan(rest);
-        rest = rest.get(scanned..).unwrap_or_default();
-        match end {
-            Some(Ok(())) if rest.is_empty() => return Ok(nesting.has_literals),
-            Some(Ok(())) => return Err(FrameError::MoreBehind),
-            // The newline, which is unscanned, is white space between tokens.
-            Some(Err(FrameError::LineEnded)) => rest = rest.get(1..).unwrap_or_default(),
-            Some(Err(error)) => return Err(error),
-            None => return Err(FrameError::LineEnded),
-        }
-    }
-}
 
 // ---- output ---------------------------------------------------------------------------------------------------------
 
