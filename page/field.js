@@ -187,7 +187,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
 
 /**
  * A number for a later request: nothing is sent when it changes. An empty field is omitted. With `choices`, values and
- * their texts, one of them is chosen instead. With `rows` it is a text of so many rows. @param {{label: string, unit?: string,
+ * their texts, one of them is chosen instead. With `rows` it is a text field of this height. @param {{label: string, unit?: string,
  * value?: string | number, placeholder?: string, choices?: [string, string][], rows?: number}} options
  */
 export function option({ label, unit = "", value = "", placeholder = "", choices = [], rows = 0 }) {

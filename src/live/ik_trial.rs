@@ -1,6 +1,6 @@
 //! Timed trials of an arm: the rules of `math::trial`, with the arm's time and lengths and with random targets.
 //!
-//! **Invariant:** the time of a trial never goes back, in whatever order the host gets the poses of the arm.
+//! **Invariant:** the time of a trial never goes back. The host may get the poses of the arm in any order.
 
 use serde::Serialize;
 

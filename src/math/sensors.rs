@@ -80,11 +80,9 @@ impl<const N: usize> Sensors<N> {
         for (position, step) in position.iter_mut().zip(&self.encoder_step) {
             if *step > 0.0 {
                 let counted = (*position / step).round() * step;
-                *position = if counted.is_finite() {
-                    counted
-                } else {
-                    *position
-                };
+                if counted.is_finite() {
+                    *position = counted;
+                }
             }
         }
         let velocity = match (self.velocity, before) {

@@ -48,7 +48,7 @@ struct TurnsBench {
     ticks: Arc<AtomicUsize>,
     /// The answers that have not been taken, in the order of the questions.
     waiting: RefCell<VecDeque<TakeAnswer>>,
-    /// Those that have been: for each, why it is none.
+    /// The answers that have been taken: the reason for each that is missing.
     answers: RefCell<Vec<Option<Unserved>>>,
 }
 

@@ -290,8 +290,6 @@ fn unmask(payload: &mut [u8], mask: &mut [u8; 4]) {
     mask.rotate_left(used);
 }
 
-// ---- a message, which is one object ---------------------------------------------------------------------------------
-
 // ---- output ---------------------------------------------------------------------------------------------------------
 
 /// Makes frames of messages, pongs and the close frame.

@@ -19,7 +19,7 @@ pub const LOST: f64 = std::f64::consts::TAU;
 /// The outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RunOutcome {
-    /// Steps that were to be taken; of a solver with a tolerance, those that it took.
+    /// Steps that were to be taken. A solver with a tolerance chooses its steps, and this is their number.
     pub steps: u64,
     /// Length of each \[s\], or their mean.
     pub timestep: f64,

@@ -85,12 +85,13 @@ pub(super) fn make(section: &mut Section) {
         let costs = ratios.map(|ratio| Cost::new(stiffness, ratio, most));
         (stiffness, costs.collect::<Vec<_>>())
     });
-    section.findings.extend(finding(&all));
+    let spring = StiffScene::new(Stiffness::Spring, ENERGY_RATIO);
+    section.findings.extend(finding(&all, &spring));
     verdicts(section, &all);
     let panels: Vec<Plot> = all
         .iter()
         .map(|(stiffness, costs)| evaluations(name(*stiffness), costs))
-        .chain([times(&all), energies()])
+        .chain([times(&all), energies(&spring)])
         .collect();
     section.figure(
         "stiff",
@@ -127,8 +128,7 @@ fn remaining(scene: &StiffScene, per_period: f64) -> [f64; SOLVERS.len()] {
     SOLVERS.map(|solver| scene.fast_energy(solver, whole(steps).max(1)))
 }
 
-fn energies() -> Plot {
-    let scene = StiffScene::new(Stiffness::Spring, ENERGY_RATIO);
+fn energies(spring: &StiffScene) -> Plot {
     let x = Axis::log(
         "steps per period of the fast motion",
         Unit::Number,
@@ -137,7 +137,7 @@ fn energies() -> Plot {
     let y = Axis::linear("energy left of the fast motion", (0.0, 1.25));
     let plot = Plot::new(format!("Spring, ratio {ENERGY_RATIO}"), x, y);
     let counts = STEPS_PER_PERIOD.map(|eighth| 10_f64.powf(0.125 * f64::from(eighth)));
-    let points: Vec<(f64, [f64; 3])> = counts.map(|it| (it, remaining(&scene, it))).collect();
+    let points: Vec<(f64, [f64; 3])> = counts.map(|it| (it, remaining(spring, it))).collect();
     plot.with((0..SOLVERS.len()).map(|index| {
         let of = |(x, parts): &(f64, [f64; 3])| Some((*x, *parts.get(index)?));
         Curve::line(key(index), points.iter().filter_map(of))
@@ -190,7 +190,7 @@ fn times(all: &[Costs]) -> Plot {
     lines(plot, costs, |_, time| time.median)
 }
 
-fn finding(all: &[Costs]) -> Option<String> {
+fn finding(all: &[Costs], spring: &StiffScene) -> Option<String> {
     let last = all.first()?.1.last()?;
     let [_, _, rodas3] = last.runs;
     let wins = all.iter().map(|(stiffness, costs)| {
@@ -203,8 +203,7 @@ fn finding(all: &[Costs]) -> Option<String> {
         )
     });
     let wins = wins.collect::<Vec<_>>().join(", ");
-    let spring = StiffScene::new(Stiffness::Spring, ENERGY_RATIO);
-    let [rk4, midpoint, damped] = remaining(&spring, 4.0).map(|part| 100.0 * part);
+    let [rk4, midpoint, damped] = remaining(spring, 4.0).map(|part| 100.0 * part);
     Some(format!(
         "**A 2-link swing of {DURATION} s from (0.4, -0.3), with a brake at the elbow {} times as fast as the swing, \
          costs Rodas3 {} evaluations within {} rad of the true motion, and RK4 at least {}**. Rodas3 is an implicit \

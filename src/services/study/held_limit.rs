@@ -111,7 +111,7 @@ fn by_row(numbers: &[f64]) -> Vec<Vec<f64>> {
     numbers.chunks(joints.max(1)).map(<[f64]>::to_vec).collect()
 }
 
-/// The same for a matrix that may also be absent, one number, or one number for each joint. The mass matrix has so many
+/// The same for a matrix that may be absent, a single number, or a number for each joint. A whole matrix has this number of
 /// `entries`.
 fn by_joint(numbers: Vec<f64>, entries: usize) -> Vec<Vec<f64>> {
     match numbers.len() {

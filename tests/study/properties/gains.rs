@@ -13,6 +13,22 @@ use pendularm::study::stability::limits;
 
 use super::{Dice, Tally, cases, property, run, tells};
 
+/// The last time \[s\] in a move of this duration at which a joint is off the setpoint; `None` if the arm diverges.
+fn off_until<const N: usize>(control: &ControlLoop<N>, duration: f64) -> Option<f64> {
+    let mut live = control.simulation(State::rest());
+    let mut off_at = 0.0;
+    while live.time() < duration {
+        if !live.step() {
+            return None;
+        }
+        let off = |i: usize| (live.state().position[i] - control.setpoint.position[i]).abs();
+        if (0..N).any(|i| off(i) > SETTLED) {
+            off_at = live.time();
+        }
+    }
+    Some(off_at)
+}
+
 /// Arms of 10 cm to 10 m and of 10 g to 100 kg a link. Suggested gains keep the margin, and settle on moves that the
 /// search has not made.
 fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
@@ -43,16 +59,9 @@ fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
     let safe = limits.bound.or(limits.minimum_held).unwrap();
     let reached = 0.999 * requirements.margin * free.timestep..=1.001 * safe;
     assert!(reached.contains(&found.limit.unwrap()), "{told}: {safe}");
-    let mut live = control.simulation(State::rest());
-    let mut off_at = 0.0;
     // Ten moves represent all of them. Another one may take 1.5 times as long.
-    while live.time() < 2.0 * requirements.settling_time {
-        assert!(live.step(), "{told}: diverged");
-        let off = |i: usize| (live.state().position[i] - control.setpoint.position[i]).abs();
-        if (0..N).any(|i| off(i) > SETTLED) {
-            off_at = live.time();
-        }
-    }
+    let off_at = off_until(&control, 2.0 * requirements.settling_time);
+    let off_at = off_at.unwrap_or_else(|| panic!("{told}: diverged"));
     assert!(
         off_at <= 1.5 * requirements.settling_time,
         "{told}: {off_at} s, {control:?}"
@@ -90,19 +99,11 @@ fn late_moves(control: &ControlLoop<2>, settling_time: f64) -> usize {
     let mut dice = Dice::of(1);
     let is_late = |_: &u32| {
         let setpoint = Setpoint::at(std::array::from_fn(|_| TAU * dice.any()));
-        let mut live = ControlLoop {
+        let control = ControlLoop {
             setpoint,
             ..*control
-        }
-        .simulation(State::rest());
-        let mut off_at = 0.0;
-        while live.time() < 2.0 * settling_time && live.step() {
-            let off = |i: usize| (live.state().position[i] - setpoint.position[i]).abs();
-            if (0..2).any(|i| off(i) > SETTLED) {
-                off_at = live.time();
-            }
-        }
-        off_at > 1.5 * settling_time
+        };
+        off_until(&control, 2.0 * settling_time).is_none_or(|at| at > 1.5 * settling_time)
     };
     (0..20).filter(is_late).count()
 }
