@@ -36,8 +36,7 @@ let mapAsked = ""; // the settings of `rows`
 /** Limits with a hold and with control in every stage [s], as far as they are known. @type {import("./chart.js").Row[]} */
 let rows = [];
 let asked; // the question of a row
-/** The base gains of the map's scale. They do not change while the arm's gains are a multiple of them, so the dot moves and the border stays. */
-let anchor = null;
+let anchor = /** @type {import("./question.js").Gains | null} */ (null); // as `baseGains` left it
 
 export function startStability() {
   startLimits();
@@ -63,12 +62,17 @@ function held() {
   return state.integrator ? stepsPerUpdate(state) * state.integrator.timestep : NaN;
 }
 
+/** The base gains of the map's scale. They do not change while the arm's gains are a multiple of them, so the dot moves and the border stays. */
+function baseGains() {
+  if (!(factorOf(state.gains, anchor) > 0)) anchor = state.gains;
+  return anchor;
+}
+
 /** The question of the border, at the base gains: that of the loop once the controller is on. The timestep does not move the border. */
 function borderQuestion() {
   const question = questionOf({ ...state, enabled: true });
   if (!question) return null;
-  if (!(factorOf(question.gains, anchor) > 0)) anchor = question.gains;
-  return { ...question, gains: anchor, control_period: 0, timestep: 0.001, q: question.setpoint, qd: question.qd.map(() => 0) };
+  return { ...question, gains: baseGains(), control_period: 0, timestep: 0.001, q: question.setpoint, qd: question.qd.map(() => 0) };
 }
 
 /** Asks the study for the border. A new request ends the old one. */
@@ -93,13 +97,13 @@ function drawStability() {
   askBorder();
   chart = new Chart(map, times, factors, { right: 10, top: 8, bottom: 36 });
   chart.frame({ across: isSampled() ? "control period" : "timestep", grid: false });
-  const factor = factorOf(state.gains, anchor);
+  const factor = factorOf(state.gains, baseGains());
   if (state.integrator && state.gains) drawMap(chart, rows, held(), factor > 0 ? factor : 1);
   describeMap();
 }
 
 function describeMap() {
-  const row = rows[Math.round(factors.place(factorOf(state.gains, anchor)) * (ROWS - 1))];
+  const row = rows[Math.round(factors.place(factorOf(state.gains, baseGains())) * (ROWS - 1))];
   if (!row || !state.integrator) return;
   setText(byId("map-value"), `at ${duration(held())}`);
   const lines = isSampled() ? `Line: limit of the control period, ${limitText(row.limit)} with these gains.`
@@ -110,7 +114,7 @@ function describeMap() {
 }
 
 function goTo(left, top) {
-  if (!state.integrator || !state.gains || !anchor || !chart) return;
+  if (!state.integrator || !state.gains || !chart) return;
   const place = (left - chart.left) / (chart.right - chart.left);
   const rise = (chart.bottom - top) / (chart.bottom - chart.top);
   if (place < 0 || place > 1 || rise < 0 || rise > 1) return;
@@ -120,9 +124,9 @@ function goTo(left, top) {
 /** A diverged arm restarts there, because otherwise the new settings would show no effect. */
 async function moveTo(time, factor) {
   const short = (value) => Number(value.toPrecision(3));
-  const gains = scaled(anchor, factor);
+  const gains = scaled(baseGains(), factor);
   const changes = [];
-  const isNewGain = Math.abs(Math.log(factor / factorOf(state.gains, anchor))) > 0.02;
+  const isNewGain = Math.abs(Math.log(factor / factorOf(state.gains, baseGains()))) > 0.02;
   if (isNewGain) changes.push(setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) }));
   if (time !== held()) changes.push(isSampled() ? setPeriod({ period: short(time) }) : setIntegrator({ timestep: short(time) }));
   await Promise.all(changes);
@@ -131,9 +135,9 @@ async function moveTo(time, factor) {
 
 function byArrows(event) {
   const step = { ArrowLeft: [1 / FINE, 1], ArrowRight: [FINE, 1], ArrowUp: [1, FINE], ArrowDown: [1, 1 / FINE] }[event.key];
-  if (!step || !state.integrator || !state.gains || !anchor) return;
+  if (!step || !state.integrator || !state.gains) return;
   event.preventDefault();
-  moveTo(times.moved(held(), step[0]), factors.moved(factorOf(state.gains, anchor), step[1]));
+  moveTo(times.moved(held(), step[0]), factors.moved(factorOf(state.gains, baseGains()), step[1]));
 }
 
 const ASK_MS = 60;
