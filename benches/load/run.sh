@@ -7,7 +7,7 @@
 # All run on free ports of loopback. Each is stopped by its process id, pendularm by the client that starts it.
 # redis-server and mosquitto come from Debian's packages. As root they are installed if missing. Takes some
 # twenty minutes.
-# ARGS=--quick plays each scene for a moment, without bars; KEEP=1 keeps the figures in
+# ARGS=--quick plays each scene for a moment, without bars, and ARGS=--scene=PART those with this in their name; KEEP=1 keeps the figures in
 # benches/results/<date>-<processor>/load/.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)

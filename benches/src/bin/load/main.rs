@@ -1,7 +1,7 @@
 //! Messages between many clients: pendularm beside redis (pub/sub) and mosquitto, the same messages in the same run.
 //!
-//! `load ports` prints three free ports of loopback. `load PATH/TO/pendularm SERVER=ADDRESS=PID ... [--quick]` starts
-//! pendularm and measures it beside servers that run already, for `benches/load/run.sh`. Round after round every scene
+//! `load ports` prints three free ports of loopback. `load PATH/TO/pendularm SERVER=ADDRESS=PID ... [--quick] [--scene=PART]`
+//! starts pendularm and measures it beside servers that run already, for `benches/load/run.sh`. Round after round every scene
 //! is played to each server in turn, by the same client on one thread. The processor time of the server for a delivery
 //! is compared: it depends little on other work of the machine. Fails if a message is lost, comes twice or comes out of
 //! order. Linux only: the figures are read from `/proc`.
@@ -14,12 +14,12 @@ mod report;
 use std::net::{SocketAddr, TcpListener};
 use std::time::{Duration, Instant};
 
-use fleet::{Fleet, Outcome, Scene, Traffic};
+use fleet::{ARM_RATE, Fleet, Outcome, Scene, Traffic};
 use pendularm_benches::program::{Program, ThreadWork, threads, threads_since};
 use pendularm_benches::protocol::Protocol;
 
-/// The rate of the arm's topics, and of all publishers that do not flood.
-const RATE: Traffic = Traffic::Rate(60.0);
+/// All publishers that do not flood have the rate of the arm's topics.
+const RATE: Traffic = Traffic::Rate(ARM_RATE);
 
 /// The scenes. The last fan-out is that of the arm's own topic.
 const SCENES: [Scene; 8] = [
@@ -85,6 +85,9 @@ fn main() {
         return print_free_ports();
     }
     let quick = arguments.iter().any(|argument| argument == "--quick");
+    let part = arguments
+        .iter()
+        .find_map(|argument| argument.strip_prefix("--scene="));
     let mut words = arguments
         .iter()
         .filter(|argument| !argument.starts_with("--"));
@@ -119,7 +122,10 @@ fn main() {
     let resting = rest_in_turn(&servers, &plan);
     report::print_rest(&resting);
     let mut verdicts = Vec::new();
-    for scene in &SCENES {
+    for scene in SCENES
+        .iter()
+        .filter(|one| part.is_none_or(|part| one.name.contains(part)))
+    {
         let played = play(scene, &servers, &resting, &plan);
         report::print_scene(scene, &played);
         verdicts.push((*scene, played));
@@ -184,9 +190,8 @@ fn play(
     plan: &Plan,
 ) -> Vec<(Protocol, Played)> {
     let takes_part = |server: &&Server| match server.protocol {
-        Protocol::Pendularm => true,
-        Protocol::Redis | Protocol::Mosquitto => scene.traffic != Traffic::Arm,
-        Protocol::Bare => matches!(scene.traffic, Traffic::Rate(_)),
+        Protocol::Bare => scene.traffic != Traffic::Flood,
+        _ => true,
     };
     let servers: Vec<&Server> = servers.iter().filter(takes_part).collect();
     let mut played: Vec<(Protocol, Played)> = servers
@@ -206,7 +211,7 @@ fn play(
                 _ => rest(server.pid, plan.seconds).processor(),
             };
             played[index].1.rests.push(at_rest);
-            let fleet = Fleet::open(server.protocol, server.address, *scene);
+            let fleet = Fleet::open(server.protocol, server.address, scene.with(server.protocol));
             let outcome = fleet.run(server.pid, plan.seconds);
             played[index].1.outcomes.push(outcome);
         }
@@ -221,7 +226,7 @@ fn play(
 
 fn probe(scene: &Scene, server: &Server, seconds: f64, played: &mut Played) {
     let (protocol, address) = (server.protocol, server.address);
-    let fleet = Fleet::open(protocol, address, *scene);
+    let fleet = Fleet::open(protocol, address, scene.with(protocol));
     let caller = probe::caller(protocol, address);
     let clock = (protocol == Protocol::Pendularm).then(|| probe::clock(address));
     fleet.run(server.pid, seconds);

@@ -177,23 +177,18 @@ pub fn print_bars(resting: &[(Protocol, Vec<Rest>)], scenes: &[(Scene, Vec<(Prot
             verdict(what, wake_ups, &bar, wake_ups <= MOST_WAKE_UPS);
         }
     }
-    for (scene, _) in scenes {
-        // The arm's own topic has no peers. It is compared with the same fan-out between clients.
-        let peers = match scene.traffic {
-            Traffic::Arm => "60 Hz to 250",
-            _ => scene.name,
+    for (scene, played) in scenes {
+        let find = |wanted| {
+            played
+                .iter()
+                .find_map(|(protocol, played)| (*protocol == wanted).then_some(played))
         };
-        let find = |name: &str, wanted| {
-            let mut all = scenes.iter().filter(|(scene, _)| scene.name == name);
-            let mut all = all.next().into_iter().flat_map(|(_, played)| played);
-            all.find_map(|(protocol, played)| (*protocol == wanted).then_some(played))
-        };
-        let Some(ours) = find(scene.name, Protocol::Pendularm) else {
+        let Some(ours) = find(Protocol::Pendularm) else {
             continue;
         };
         let (reference, most) = bar(scene);
         for protocol in [Protocol::Bare, Protocol::Redis, Protocol::Mosquitto] {
-            let Some(peer) = find(peers, protocol) else {
+            let Some(peer) = find(protocol) else {
                 continue;
             };
             let ratio = median(costs(ours)) / median(costs(peer));

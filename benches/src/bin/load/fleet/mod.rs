@@ -25,6 +25,9 @@ const BURST: u64 = 16;
 /// drops any.
 const WINDOW: u64 = 256;
 
+/// Messages of the arm in a second.
+pub const ARM_RATE: f64 = 60.0;
+
 /// The publisher, and its rate.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Traffic {
@@ -60,6 +63,17 @@ impl Scene {
             topics: 1,
             subscribers,
             traffic,
+        }
+    }
+
+    /// The same scene as a server plays it: only pendularm has an arm. The others get messages of its length and rate.
+    pub fn with(self, server: Protocol) -> Self {
+        match self.traffic {
+            Traffic::Arm if server != Protocol::Pendularm => Self {
+                traffic: Traffic::Rate(ARM_RATE),
+                ..self
+            },
+            _ => self,
         }
     }
 
