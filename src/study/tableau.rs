@@ -9,6 +9,7 @@
 //! **Invariant:** every tableau is explicit and finite, and has at most [`MAX_STAGES`] stages.
 
 use crate::math::integrator::Method;
+use crate::math::shown::Shown;
 
 /// Most stages of a method.
 pub const MAX_STAGES: usize = 12;
@@ -50,7 +51,8 @@ pub enum TableauError {
     },
     /// The method is implicit.
     #[error(
-        "row {row} of a is implicit: a[{row}][{column}] is {value}, and only entries left of the diagonal may differ from 0"
+        "row {row} of a is implicit: a[{row}][{column}] is {}, and only entries left of the diagonal may differ from 0",
+        Shown(*.value)
     )]
     Implicit {
         /// The row.
@@ -61,7 +63,7 @@ pub enum TableauError {
         value: f64,
     },
     /// A coefficient is not finite, or too large.
-    #[error("a coefficient must be between -{LARGEST} and {LARGEST}, got {0}")]
+    #[error("a coefficient must be between -{LARGEST} and {LARGEST}, got {}", Shown(*.0))]
     Coefficient(f64),
     /// There is not one entry for each stage.
     #[error("{name} must have {stages} entries, one for each stage, got {got}")]

@@ -95,9 +95,27 @@ impl Ask for FindHeldLimit {
     }
 }
 
-/// The numbers of a matrix. A number that is not finite is refused with the others.
+/// The numbers of a matrix, row by row. Each row may be an array of its own. A number that is not finite is refused with
+/// the others.
 fn matrix(fields: &mut Fields<'_>, name: &'static str) -> Vec<f64> {
-    let entries = fields.entries(name, MOST_ENTRIES).unwrap_or_default();
+    let mut entries = fields.entries(name, MOST_ENTRIES).unwrap_or_default();
+    if entries
+        .first()
+        .is_some_and(|raw| raw.get().starts_with('['))
+    {
+        let joints = entries.len();
+        let row = |raw| json::entries(raw, joints).filter(|row| row.count == joints);
+        let rows: Option<Vec<_>> = entries.into_iter().map(row).collect();
+        match rows.filter(|_| joints * joints <= MOST_ENTRIES) {
+            Some(rows) => entries = rows.into_iter().flat_map(|row| row.first).collect(),
+            None => {
+                let most = MOST_ENTRIES.isqrt();
+                let reason = format!("must have n rows of n numbers, n at most {most}");
+                fields.refuse(name, &reason);
+                return vec![];
+            }
+        }
+    }
     let numbers: Option<Vec<f64>> = entries.into_iter().map(json::number).collect();
     if numbers.is_none() {
         fields.refuse(name, &"must be an array of numbers");

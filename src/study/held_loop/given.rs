@@ -3,6 +3,7 @@
 //! **Invariant:** every accepted loop has a positive definite mass matrix and finite entries.
 
 use super::{Between, HeldLoop, Matrices};
+use crate::math::shown::{Shown, shown_against};
 use crate::study::matrix::Matrix;
 
 /// Most joints.
@@ -73,7 +74,11 @@ pub enum HeldError {
         value: f64,
     },
     /// The mass matrix is not symmetric.
-    #[error("M must be symmetric: M[{row}][{column}] is {one}, M[{column}][{row}] is {other}")]
+    #[error(
+        "M must be symmetric: M[{row}][{column}] is {}, M[{column}][{row}] is {}",
+        shown_against(*.one, *.other),
+        shown_against(*.other, *.one)
+    )]
     NotSymmetric {
         /// The row.
         row: usize,
@@ -104,7 +109,7 @@ pub enum HeldError {
         most: usize,
     },
     /// The period is not a length of time.
-    #[error("period must be finite and greater than 0, got {0}")]
+    #[error("period must be finite and greater than 0, got {}", Shown(*.0))]
     Period(f64),
 }
 

@@ -127,9 +127,10 @@ pub(super) fn fraction(value: f64) -> String {
         (numerator - numerator.round()).abs() <= 1e-12 * f64::from(*denominator)
     };
     match (1..=10_000).find(fits) {
-        Some(1) => format!("{}", value.round()),
+        // Adding 0 removes the sign of a negative zero.
+        Some(1) => format!("{}", value.round() + 0.0),
         Some(denominator) => format!("{}/{denominator}", (value * f64::from(denominator)).round()),
-        None => format!("{value}"),
+        None => format!("{value:?}"),
     }
 }
 
