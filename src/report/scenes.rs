@@ -1,8 +1,7 @@
 //! The live arms that show the scenes: settings, initial state and duration. The rows are those of the page, in
 //! `page/scenes.js`.
 //!
-//! A scene simulates many arms and checks numbers. Its live arm is one of them. The report shows it as a picture, with
-//! a link that opens it on the page.
+//! A scene simulates many arms and checks numbers. Its live arm is one of them. The report shows it as a picture.
 //!
 //! **Invariant:** every scene has a row. A scene that no live arm can show has the reason.
 
@@ -15,13 +14,14 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::math::arm::{Arm, State};
-use crate::math::count::whole;
 use crate::math::integrator::Method;
 use crate::math::limits::Limits;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::sensors::Sensors;
 use crate::math::simulation::{ControlPeriod, DEFAULT_TIMESTEP};
 use crate::study::control_loop::ControlLoop;
+use crate::study::paused::at_once;
+use crate::study::rollout::{RolloutRequest, rollout};
 
 /// The page's module, whose rows are JSON.
 const MODULE: &str = include_str!("../../page/scenes.js");
@@ -51,10 +51,8 @@ pub struct LiveScene {
 pub struct LiveRun {
     /// Time \[s\], and the angle of each joint from its start \[rad\].
     pub samples: Vec<(f64, Vec<f64>)>,
-    /// Whether the run diverged at the next step.
-    pub diverged: bool,
-    /// The settings as the page reads them behind the `#` of its address.
-    pub fragment: String,
+    /// The time after which the run diverged \[s\].
+    pub lost_at: Option<f64>,
 }
 
 /// All scenes, in order.
@@ -137,71 +135,28 @@ impl LiveScene {
     }
 
     fn run<const N: usize>(&self) -> Result<LiveRun, String> {
-        /// Samples of a picture.
-        const SAMPLES: u64 = 120;
-        let control = self.control::<N>()?;
         let start = State {
             position: list(&self.watch["start"], list(&self.start, [0.0; N])),
             velocity: list(&self.velocity, [0.0; N]),
         };
-        let mut simulation = control.simulation(start);
-        let steps = whole((self.seconds() / control.timestep).round());
-        let each = steps.div_ceil(SAMPLES).max(1);
-        let mut watched = LiveRun {
-            samples: vec![(0.0, vec![0.0; N])],
-            diverged: false,
-            fragment: fragment(&control, &start),
+        let made = at_once(rollout(RolloutRequest {
+            control: self.control::<N>()?,
+            start,
+            duration: self.seconds(),
+            samples: 121,
+            reference: false,
+        }));
+        let made = made.map_err(|error| error.to_string())?;
+        let moved = |position: [f64; N]| {
+            let pairs = position.iter().zip(start.position);
+            pairs.map(|(now, start)| now - start).collect()
         };
-        while simulation.time() < self.seconds() && !watched.diverged {
-            watched.diverged = simulation.advance(each) < each;
-            let angles = simulation.state().position.iter().zip(start.position);
-            let angles = angles.map(|(now, start)| now - start).collect();
-            watched.samples.push((simulation.time(), angles));
-        }
-        Ok(watched)
+        let samples = made.times.into_iter().zip(made.positions);
+        Ok(LiveRun {
+            samples: samples.map(|(time, it)| (time, moved(it))).collect(),
+            lost_at: made.divergence.map(|it| it.time),
+        })
     }
-}
-
-fn fragment<const N: usize>(control: &ControlLoop<N>, start: &State<N>) -> String {
-    let list = |values: &[f64; N]| values.map(|value| format!("{value:?}")).join(",");
-    let on_off = |on: bool| if on { "on" } else { "off" };
-    let ControlLoop {
-        arm,
-        gains,
-        period,
-        limits,
-        sensors,
-        ..
-    } = control;
-    let law = if control.is_free() {
-        String::new()
-    } else {
-        let Gains { kp, ki, kd } = gains;
-        let setpoint = list(&control.setpoint.position);
-        let [kp, ki, kd] = [kp, ki, kd].map(list);
-        format!("&kp={kp}&ki={ki}&kd={kd}&setpoint={setpoint}")
-    };
-    format!(
-        "links={N}&method={}&timestep={:?}&gravity={:?}&masses={}&lengths={}{law}&period={:?}&delay={}&controller={}\
-         &viscous={}&effort_limit={}&encoder_step={}&control_delay={}&position={}&velocity={}",
-        control.method,
-        control.timestep,
-        arm.gravity(),
-        list(arm.masses()),
-        list(arm.lengths()),
-        period.period,
-        on_off(period.delay > 0),
-        on_off(!control.is_free()),
-        list(arm.viscous()),
-        limits
-            .effort
-            .as_ref()
-            .map_or_else(|| "none".to_owned(), list),
-        list(&sensors.encoder_step),
-        period.delay,
-        list(&start.position),
-        list(&start.velocity),
-    )
 }
 
 fn number(value: &Value, standard: f64) -> f64 {

@@ -86,6 +86,12 @@ pub fn coefficient(text: &str) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
+/// Rows of coefficients: `;` ends a row. `None` if one is no number.
+pub(crate) fn rows(text: &str) -> Option<Vec<Vec<f64>>> {
+    let row = |row: &str| row.split_whitespace().map(coefficient).collect();
+    text.split(';').map(row).collect()
+}
+
 impl Tableau {
     /// The tableau with the rows of `a`, with or without the zeros on and right of the diagonal.
     ///

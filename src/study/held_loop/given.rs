@@ -136,7 +136,7 @@ impl TryFrom<&Given> for HeldLoop {
         };
         let held = Self {
             // Both are in range.
-            delay: usize::try_from(delay).unwrap_or_default(),
+            delay: u8::try_from(delay).unwrap_or_default(),
             steps: u32::try_from(steps).unwrap_or(1),
             between: given.between.clone(),
             ..Self::new(matrices).map_err(HeldError::NotPositive)?

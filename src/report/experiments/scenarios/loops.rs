@@ -10,8 +10,8 @@ use super::support::{
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{energy, forward_dynamics};
 use crate::math::integrator::Method;
-use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
-use crate::math::simulation::state_after;
+use crate::math::limits::Limits;
+use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use crate::report::experiments::conditioning::digits_lost;
 use crate::report::experiments::error::REACH_GAINS as MODERATE;
 use crate::report::experiments::measure::{
@@ -320,35 +320,29 @@ fn late_control() -> Observation {
     (is_less && late.agrees(), words)
 }
 
-/// The shipped law has no cap on the effort; this scene puts one behind it.
 fn windup() -> Observation {
-    const CAP: f64 = 10.0;
-    const H: f64 = 0.001;
-    let blocked = held(gains(100.0, 50.0, [20.0; 2]), [0.0; 2]);
-    let mut pid = Pid::new(blocked.gains);
-    pid.enable(true);
-    pid.set_setpoint(blocked.setpoint);
-    let mut state = State::at_rest([-1.5, 0.0]);
-    let mut unlimited = 0.0;
-    let mut advance = |pid: &mut Pid<2>, steps: u32| {
-        for _ in 0..steps {
-            let control = pid.control(&state, H);
-            pid.commit(control.integral);
-            unlimited += (pid.setpoint().position[0] - state.position[0]) * H;
-            let effort = control.effort.map(|effort| effort.clamp(-CAP, CAP));
-            state = state_after(&blocked.arm, Method::Rk4, &state, &effort, H);
-        }
-        (state, unlimited)
+    let control = ControlLoop {
+        limits: Limits {
+            effort: Some([10.0; 2]),
+            ..Limits::default()
+        },
+        ..held(gains(100.0, 50.0, [20.0; 2]), [0.0; 2])
     };
-    let (_, wound) = advance(&mut pid, 60_000);
-    let limited = pid.integral()[0];
+    let mut live = control.simulation(State::at_rest([-1.5, 0.0]));
+    let mut wound = 0.0;
+    for _ in 0..60_000 {
+        wound -= live.state().position[0] * control.timestep;
+        live.step();
+    }
+    let limited = live.pid().integral()[0];
     // Hanging needs no effort. The integral has to be unwound by the opposite error first.
     let goal = [-FRAC_PI_2, 0.0];
-    pid.set_setpoint(Setpoint::at(goal));
+    live.set_setpoint(Setpoint::at(goal));
     let recovered = (1..=600_u32).find(|_| {
-        let (state, _) = advance(&mut pid, 1000);
-        let is_near = (0..2).all(|i| (state.position[i] - goal[i]).abs() < 0.02);
-        is_near && state.velocity.iter().all(|v| v.abs() < 0.02)
+        live.advance(1000);
+        let State { position, velocity } = live.state();
+        let is_near = (0..2).all(|i| (position[i] - goal[i]).abs() < 0.02);
+        is_near && velocity.iter().all(|v| v.abs() < 0.02)
     });
     let back = recovered.map_or_else(|| "never".to_owned(), |s| format!("after {s} s"));
     let integrals = format!("integral {limited:.1} rad s, unlimited {wound:.1}");
