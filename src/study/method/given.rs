@@ -60,7 +60,9 @@ impl TryFrom<&Typed> for Given {
         let beside = |name, entries: &[f64]| {
             let (stages, got) = (typed.b.len(), entries.len());
             if got != stages {
-                return Err(at(name)(TableauError::Entries { name, stages, got }));
+                let why =
+                    format!("{name} must have {stages} entries, one for each stage, got {got}");
+                return Err(at(name)(TableauError(why)));
             }
             Tableau::new(&typed.a, entries).map_err(at(name))
         };
