@@ -85,17 +85,9 @@ impl LiveScene {
     /// Asks `/study/rollout`.
     fn run<const N: usize>(&self) -> Result<LiveRun, String> {
         let (settings, watch) = (&self.settings, &self.watch);
-        let given = |one: &Value, other: &Value| {
-            if one.is_null() {
-                other.clone()
-            } else {
-                one.clone()
-            }
-        };
-        let gains = match settings["controller"] == true {
-            true => given(&settings["gains"], &json!({})),
-            false => Value::Null,
-        };
+        let given = |choices: [&Value; 2]| choices.into_iter().find(|it| !it.is_null()).cloned();
+        let is_held = settings["controller"] == true;
+        let gains = is_held.then(|| given([&settings["gains"], &json!({})]));
         let mut question = json!({
             "params": settings["params"],
             "viscous": settings["friction"]["viscous"],
@@ -106,8 +98,8 @@ impl LiveScene {
             "control_period": settings["period"]["period"],
             "delay": settings["period"]["delay"],
             "integrator": settings["integrator"]["method"],
-            "timestep": given(&watch["timestep"], &settings["integrator"]["timestep"]),
-            "q": given(&watch["start"], &self.start),
+            "timestep": given([&watch["timestep"], &settings["integrator"]["timestep"]]),
+            "q": given([&watch["start"], &self.start]),
             "qd": self.velocity,
             "duration": self.seconds(),
             "samples": 121,
