@@ -1,5 +1,5 @@
 // The 43 stiff and extreme scenes as settings of the live arm: each with its pose at the start and one sentence about its
-// behaviour. The report reads the rows from this file, for its pictures and links, so they are JSON.
+// behaviour. The report reads the rows from this file, for its pictures, so they are JSON.
 // Invariant: the rows are those of `src/report/experiments/scenarios/`, in their order.
 
 import { DEFAULTS } from "./settings.js";
@@ -49,7 +49,8 @@ export const SCENES = [
     "settings": {"controller": true, "setpoint": [0.5, 0.8], "gains": {"kp": [200, 100], "ki": [0, 0], "kd": [30, 12]}, "period": {"period": 0.01,
     "delay": true}}, "watch": {"start": [0, 0], "seconds": 3}},
   {"id": "S14", "name": "windup", "links": 2, "expected": "The integral grows while the arm is below.", "start": [-1.5707963267948966, 0],
-    "settings": {"controller": true, "setpoint": [0, 0], "gains": {"kp": [100, 100], "ki": [50, 50], "kd": [20, 20]}}, "hidden": "needs capped efforts"},
+    "settings": {"controller": true, "setpoint": [0, 0], "gains": {"kp": [100, 100], "ki": [50, 50], "kd": [20, 20]},
+    "motors": {"effort": [10, 10], "anti_windup": "clamp", "tracking_time": 0.2}}, "watch": {"seconds": 60}},
   {"id": "S15", "name": "too much integral", "links": 2, "expected": "These gains fail, however short the step.", "start": [0.5, 0.8],
     "settings": {"controller": true, "setpoint": [0.5, 0.8], "gains": {"kp": [100, 100], "ki": [2000, 2000], "kd": [20, 20]}}, "watch": {"start": [0, 0],
     "seconds": 3}},

@@ -62,7 +62,7 @@ def keep(report):
         "",
         f"Made by `make report KEEP=1` with pendularm {summary['machine']['version']} on {facts['Processor']}, {facts['Cores']} cores, "
         f"load {load} at the start.{look}",
-        "The page, all twelve figures and their numbers as CSV are made by the same command in `report/`. Kept here: "
+        "The page, all figures and their numbers as CSV are made by the same command in `report/`. Kept here: "
         "the sentences and tables as [report.json](report.json), the counts of instructions as [work.csv](work.csv), and three pictures: "
         + ", ".join(f"[{name.removesuffix('.svg')}]({name})" for name in PICTURES) + ".",
     ]

@@ -45,7 +45,7 @@ pub(crate) fn held_limit<'py>(
         ))
     })?;
     if let Some(period) = period.filter(|it| !(*it > 0.0 && it.is_finite())) {
-        return Err(refused(HeldError::Period(period)));
+        return Err(refused(HeldError::period(period)));
     }
     let given = Given {
         mass: arguments.mass,

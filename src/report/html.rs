@@ -1,4 +1,4 @@
-//! The page: abstract, findings, numbered figures and tables, verdicts. One file, no script, no network.
+//! The page: findings, numbered figures and tables, verdicts. One file, no script, no network.
 //!
 //! **Invariant:** text from a section is escaped where the section makes HTML of it, or here.
 
@@ -11,10 +11,7 @@ const PAGE_STYLE: &str = include_str!("page.css");
 /// The section for maintainers; it comes last.
 const LAST: &str = "work";
 
-/// The sections whose first claims make the abstract, in this order.
-const ABSTRACT: [&str; 5] = ["error", "budget", "stability", "stiff", "scenarios"];
-
-const METHOD: &str = "Sections run in parallel on all cores; sections that measure times run one after the other. \
+const METHOD: &str = "Sections that measure times run one after the other, beside all others. \
      Times are processor times of one thread, the median of 31 runs after one untimed run. While the \
      clock runs nothing is counted, compared or written. Errors come from separate runs of the same steps. References \
      are Taylor series of order 30 in double-double arithmetic. They start from the Lagrangian and share no formula \
@@ -49,25 +46,13 @@ pub(crate) fn page(sections: &[Section], machine: &Machine) -> String {
          <header><h1>Which method, at which timestep, for which error, at what cost</h1>\
          <p>The arm of pendularm under each of its integrators. Version {}.</p></header><nav>{}\
          <a href=\"#verdicts\">Verdicts</a><a href=\"#making\">How this was made</a></nav><main>\
-         <section id=\"abstract\"><h2>Abstract</h2><p>{}</p></section>\
          <section><h2>Findings</h2><ul class=\"findings\">{}</ul></section>{body}{}</main></body></html>\n",
         style(),
         escape(&machine.version),
         sections.iter().map(link).collect::<String>(),
-        summary(sections),
         findings.collect::<String>(),
         making(sections, machine)
     )
-}
-
-/// The claim of the first finding of each section of the abstract.
-fn summary(sections: &[Section]) -> String {
-    let claims = ABSTRACT.iter().filter_map(|name| {
-        let section = sections.iter().find(|section| section.name == *name)?;
-        let claim = section.findings.first()?.split("**").nth(1)?;
-        Some(escape(claim.trim_end_matches('.')) + ". ")
-    });
-    claims.collect()
 }
 
 fn section(section: &Section) -> String {
@@ -110,11 +95,7 @@ fn making(sections: &[Section], machine: &Machine) -> String {
     };
     let made = |section: &Section| {
         let quick = if section.quick { ", quick" } else { "" };
-        let (name, version) = (&section.name, escape(&section.version));
-        format!(
-            "<li>{name}: {:.0} s at {version}{quick}</li>",
-            section.seconds
-        )
+        format!("<li>{}: {:.0} s{quick}</li>", section.name, section.seconds)
     };
     format!(
         "<section id=\"making\"><h2>How this was made</h2><dl>{}</dl><p>{METHOD}</p><ul class=\"sections\">{}</ul>\

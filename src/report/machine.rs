@@ -4,13 +4,13 @@
 
 use std::fs;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// The program's version, with the commit of a release build.
 const VERSION: &str = env!("PENDULARM_VERSION");
 
 /// Facts about the machine and the build, in the order in which they are shown.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Machine {
     /// The program's version, with the commit of a release build.
     pub(crate) version: String,

@@ -1,8 +1,7 @@
 //! The live arms that show the scenes: settings, initial state and duration. The rows are those of the page, in
 //! `page/scenes.js`.
 //!
-//! A scene simulates many arms and checks numbers. Its live arm is one of them. The report shows it as a picture, with
-//! a link that opens it on the page.
+//! A scene simulates many arms and checks numbers. Its live arm is one of them. The report shows it as a picture.
 //!
 //! **Invariant:** every scene has a row. A scene that no live arm can show has the reason.
 
@@ -12,16 +11,17 @@
 )]
 
 use serde::Deserialize;
-use serde_json::Value;
+use serde_json::value::to_raw_value;
+use serde_json::{Value, json};
 
 use crate::math::arm::{Arm, State};
-use crate::math::count::whole;
-use crate::math::integrator::Method;
-use crate::math::limits::Limits;
-use crate::math::pid::{Gains, Setpoint};
-use crate::math::sensors::Sensors;
-use crate::math::simulation::{ControlPeriod, DEFAULT_TIMESTEP};
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Arguments;
+use crate::services::Ask as _;
+use crate::services::study::{Present, RunOffline};
 use crate::study::control_loop::ControlLoop;
+use crate::study::paused::at_once;
+use crate::study::rollout::rollout;
 
 /// The page's module, whose rows are JSON.
 const MODULE: &str = include_str!("../../page/scenes.js");
@@ -51,10 +51,8 @@ pub struct LiveScene {
 pub struct LiveRun {
     /// Time \[s\], and the angle of each joint from its start \[rad\].
     pub samples: Vec<(f64, Vec<f64>)>,
-    /// Whether the run diverged at the next step.
-    pub diverged: bool,
-    /// The settings as the page reads them behind the `#` of its address.
-    pub fragment: String,
+    /// The time after which the run diverged \[s\].
+    pub lost_at: Option<f64>,
 }
 
 /// All scenes, in order.
@@ -69,7 +67,7 @@ pub fn live_scenes() -> Vec<LiveScene> {
 impl LiveScene {
     /// Duration of the picture \[s\]; 0 for a scene without one.
     pub fn seconds(&self) -> f64 {
-        number(&self.watch["seconds"], 0.0)
+        self.watch["seconds"].as_f64().unwrap_or_default()
     }
 
     /// Runs the arm.
@@ -84,133 +82,49 @@ impl LiveScene {
         }
     }
 
-    fn control<const N: usize>(&self) -> Result<ControlLoop<N>, String> {
-        let settings = &self.settings;
-        let (params, standard) = (&settings["params"], Arm::<N>::default());
-        let arm = Arm::new(
-            list(&params["lengths"], *standard.lengths()),
-            list(&params["masses"], *standard.masses()),
-            number(&params["gravity"], standard.gravity()),
-        );
-        let viscous = list(&settings["friction"]["viscous"], [0.0; N]);
-        let arm = arm.and_then(|arm| arm.with_friction(viscous));
-        let arm = arm.map_err(|error| error.to_string())?;
-        let control = if settings["controller"] == true {
-            let (gains, standard) = (&settings["gains"], Gains::default());
-            let gains = Gains {
-                kp: list(&gains["kp"], standard.kp),
-                ki: list(&gains["ki"], standard.ki),
-                kd: list(&gains["kd"], standard.kd),
-            };
-            let setpoint = list(&settings["setpoint"], [0.0; N]);
-            ControlLoop::new(arm, gains, Setpoint::at(setpoint))
-        } else {
-            ControlLoop::free(arm)
-        };
-        let (integrator, period) = (&settings["integrator"], &settings["period"]);
-        let (motors, sensors) = (&settings["motors"], &settings["sensors"]);
-        let effort = motors["effort"].as_array();
-        let control = ControlLoop {
-            limits: Limits {
-                effort: effort.map(|_| list(&motors["effort"], [0.0; N])),
-                ..Limits::default()
-            },
-            sensors: Sensors {
-                encoder_step: list(&sensors["encoder_step"], [0.0; N]),
-                ..Sensors::default()
-            },
-            ..control
-        };
-        let method = integrator["method"].as_str();
-        let method = method.and_then(|name| name.parse().ok());
-        let timestep = number(&integrator["timestep"], DEFAULT_TIMESTEP);
-        Ok(control
-            .with_method(method.unwrap_or(Method::Rk4))
-            .with_timestep(number(&self.watch["timestep"], timestep))
-            .with_period(ControlPeriod {
-                period: number(&period["period"], 0.0),
-                delay: match sensors["delay"].as_u64() {
-                    Some(delay) => u8::try_from(delay).unwrap_or(0),
-                    None => u8::from(period["delay"] == true),
-                },
-            }))
-    }
-
+    /// Asks `/study/rollout`.
     fn run<const N: usize>(&self) -> Result<LiveRun, String> {
-        /// Samples of a picture.
-        const SAMPLES: u64 = 120;
-        let control = self.control::<N>()?;
-        let start = State {
-            position: list(&self.watch["start"], list(&self.start, [0.0; N])),
-            velocity: list(&self.velocity, [0.0; N]),
-        };
-        let mut simulation = control.simulation(start);
-        let steps = whole((self.seconds() / control.timestep).round());
-        let each = steps.div_ceil(SAMPLES).max(1);
-        let mut watched = LiveRun {
-            samples: vec![(0.0, vec![0.0; N])],
-            diverged: false,
-            fragment: fragment(&control, &start),
-        };
-        while simulation.time() < self.seconds() && !watched.diverged {
-            watched.diverged = simulation.advance(each) < each;
-            let angles = simulation.state().position.iter().zip(start.position);
-            let angles = angles.map(|(now, start)| now - start).collect();
-            watched.samples.push((simulation.time(), angles));
+        let (settings, watch) = (&self.settings, &self.watch);
+        let given = |choices: [&Value; 2]| choices.into_iter().find(|it| !it.is_null()).cloned();
+        let is_held = settings["controller"] == true;
+        let gains = is_held.then(|| given([&settings["gains"], &json!({})]));
+        let mut question = json!({
+            "params": settings["params"],
+            "viscous": settings["friction"]["viscous"],
+            "gains": gains,
+            "setpoint": settings["setpoint"],
+            "limits": settings["motors"],
+            "sensors": settings["sensors"],
+            "control_period": settings["period"]["period"],
+            "delay": settings["period"]["delay"],
+            "integrator": settings["integrator"]["method"],
+            "timestep": given([&watch["timestep"], &settings["integrator"]["timestep"]]),
+            "q": given([&watch["start"], &self.start]),
+            "qd": self.velocity,
+            "duration": self.seconds(),
+            "samples": 121,
+        });
+        // A missing member has its default.
+        if let Some(members) = question.as_object_mut() {
+            members.retain(|_, value| !value.is_null());
         }
-        Ok(watched)
+        let question = to_raw_value(&question).map_err(|error| error.to_string())?;
+        let question = RunOffline::<N>::read(Service::Rollout, &Arguments::from(question));
+        let question = question.map_err(|why| why.to_string())?;
+        let request = question.request(&Present {
+            control: ControlLoop::free(Arm::default()),
+            state: State::rest(),
+        });
+        let request = request.map_err(|error| error.to_string())?;
+        let made = at_once(rollout(request)).map_err(|error| error.to_string())?;
+        let moved = |position: [f64; N]| {
+            let pairs = position.iter().zip(request.start.position);
+            pairs.map(|(now, start)| now - start).collect()
+        };
+        let samples = made.times.into_iter().zip(made.positions);
+        Ok(LiveRun {
+            samples: samples.map(|(time, it)| (time, moved(it))).collect(),
+            lost_at: made.divergence.map(|it| it.time),
+        })
     }
-}
-
-fn fragment<const N: usize>(control: &ControlLoop<N>, start: &State<N>) -> String {
-    let list = |values: &[f64; N]| values.map(|value| format!("{value:?}")).join(",");
-    let on_off = |on: bool| if on { "on" } else { "off" };
-    let ControlLoop {
-        arm,
-        gains,
-        period,
-        limits,
-        sensors,
-        ..
-    } = control;
-    let law = if control.is_free() {
-        String::new()
-    } else {
-        let Gains { kp, ki, kd } = gains;
-        let setpoint = list(&control.setpoint.position);
-        let [kp, ki, kd] = [kp, ki, kd].map(list);
-        format!("&kp={kp}&ki={ki}&kd={kd}&setpoint={setpoint}")
-    };
-    format!(
-        "links={N}&method={}&timestep={:?}&gravity={:?}&masses={}&lengths={}{law}&period={:?}&delay={}&controller={}\
-         &viscous={}&effort_limit={}&encoder_step={}&control_delay={}&position={}&velocity={}",
-        control.method,
-        control.timestep,
-        arm.gravity(),
-        list(arm.masses()),
-        list(arm.lengths()),
-        period.period,
-        on_off(period.delay > 0),
-        on_off(!control.is_free()),
-        list(arm.viscous()),
-        limits
-            .effort
-            .as_ref()
-            .map_or_else(|| "none".to_owned(), list),
-        list(&sensors.encoder_step),
-        period.delay,
-        list(&start.position),
-        list(&start.velocity),
-    )
-}
-
-fn number(value: &Value, standard: f64) -> f64 {
-    value.as_f64().unwrap_or(standard)
-}
-
-/// The numbers of a list, padded with zeros.
-fn list<const N: usize>(value: &Value, standard: [f64; N]) -> [f64; N] {
-    value.as_array().map_or(standard, |values| {
-        std::array::from_fn(|i| values.get(i).map_or(0.0, |value| number(value, 0.0)))
-    })
 }

@@ -1,12 +1,10 @@
 //! A section of the report under construction: findings, verdicts, and figures and tables as HTML.
 //!
-//! A section is kept in a file of its own as JSON, so that `--only` can recompute one and keep the others.
-//!
 //! **Invariant:** every sentence and every cell is made from numbers of the run that made the section.
 
 use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::svg::{HEIGHT, Key, Marker, Plot, WIDTH, csv, escape, lines, style};
@@ -14,7 +12,7 @@ use crate::math::count::length_in_f64;
 use crate::study::tableau::Pair;
 
 /// One part of the report.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub(crate) struct Section {
     pub(crate) name: String,
     pub(crate) title: String,
@@ -23,12 +21,13 @@ pub(crate) struct Section {
     pub(crate) verdicts: Vec<Verdict>,
     /// Tables in words alone.
     pub(super) tables: Vec<Value>,
-    /// Run time \[s\], and the program's version.
+    /// Run time \[s\].
     pub(crate) seconds: f64,
-    pub(crate) version: String,
-    /// Whether it was made with `--quick`.
+    /// Whether it is made with `--quick`.
+    #[serde(skip)]
     pub(crate) quick: bool,
     /// Figures and tables, in order.
+    #[serde(skip)]
     pub(crate) html: String,
     /// The processor of the measurements.
     #[serde(skip)]
@@ -45,7 +44,7 @@ pub(crate) struct Section {
 }
 
 /// A claim of the section, and whether it holds.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Verdict {
     /// The claim that should hold.
     pub(crate) claim: String,

@@ -43,13 +43,7 @@ pub(super) fn critical<const N: usize>(
         return None;
     }
     let generator = stepping.generator(period);
-    let growth = |mu: &Complex| 2.0 * mu.re + period * mu.modulus() * mu.modulus();
-    let fastest = generator
-        .eigenvalues()
-        .into_iter()
-        // The zero of a joint that only drifts is exact, and limits nothing.
-        .filter(|mu| mu.modulus() != 0.0)
-        .max_by(|one, other| growth(one).total_cmp(&growth(other)))?;
+    let fastest = fastest(&generator, period)?;
     let (re, im) = (1.0 + period * fastest.re, period * fastest.im);
     let found = Critical {
         growth_per_step: hypot(re, im).max(1.0),
@@ -57,6 +51,15 @@ pub(super) fn critical<const N: usize>(
         joint: furthest(&generator, fastest, linear.joints())?,
     };
     (found.growth_per_step.is_finite() && found.frequency.is_finite()).then_some(found)
+}
+
+/// The eigenvalue of `E` in `x ↦ (I + T E) x` whose mode grows fastest.
+pub(super) fn fastest(generator: &Matrix, period: f64) -> Option<Complex> {
+    let growth = |mu: &Complex| 2.0 * mu.re + period * mu.modulus() * mu.modulus();
+    let values = generator.eigenvalues().into_iter();
+    // The zero of a joint that only drifts is exact, and limits nothing.
+    let moving = values.filter(|mu| mu.modulus() != 0.0);
+    moving.max_by(|one, other| growth(one).total_cmp(&growth(other)))
 }
 
 /// The index of the largest of the first `joints` entries of an eigenvector.

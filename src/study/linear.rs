@@ -176,32 +176,7 @@ impl Linear {
             law[(joint, joint)] -= ki;
             law[(joint, integrals + k)] = ki / period;
         }
-        let mut closed = Matrix::zeros(size);
-        for row in 0..2 * n {
-            for column in 0..2 * n {
-                closed[(row, column)] = arm[(row, column)];
-            }
-            for j in 0..n {
-                let effect = arm[(row, 2 * n + j)];
-                if delay > 0 {
-                    closed[(row, 2 * n + j)] = effect;
-                } else {
-                    for column in 0..size {
-                        closed[(row, column)] += effect * period * law[(j, column)];
-                    }
-                }
-            }
-        }
-        for row in 2 * n..integrals {
-            closed[(row, row)] = -1.0 / period;
-            if row + n < integrals {
-                closed[(row, row + n)] = 1.0 / period;
-            } else {
-                for column in 0..size {
-                    closed[(row, column)] += law[(row + n - integrals, column)];
-                }
-            }
-        }
+        let mut closed = fed_back(arm, &law, delay, period);
         for (k, &(joint, _)) in self.integrals.iter().enumerate() {
             closed[(integrals + k, joint)] = -1.0;
         }
@@ -228,4 +203,38 @@ impl Linear {
         }
         plant
     }
+}
+
+/// The rows of positions, velocities and efforts on their way, of a loop with a `law`: row `j` is the effort of joint `j`
+/// divided by the period, by the states. All other rows are zero. `arm` is the matrix of a period under constant efforts.
+pub(super) fn fed_back(arm: &Matrix, law: &Matrix, delay: u8, period: f64) -> Matrix {
+    let (n, size) = (arm.size() / 3, law.size());
+    let queued = (2 + usize::from(delay)) * n;
+    let mut closed = Matrix::zeros(size);
+    for row in 0..2 * n {
+        for column in 0..2 * n {
+            closed[(row, column)] = arm[(row, column)];
+        }
+        for j in 0..n {
+            let effect = arm[(row, 2 * n + j)];
+            if delay > 0 {
+                closed[(row, 2 * n + j)] = effect;
+            } else {
+                for column in 0..size {
+                    closed[(row, column)] += effect * period * law[(j, column)];
+                }
+            }
+        }
+    }
+    for row in 2 * n..queued {
+        closed[(row, row)] = -1.0 / period;
+        if row + n < queued {
+            closed[(row, row + n)] = 1.0 / period;
+        } else {
+            for column in 0..size {
+                closed[(row, column)] += law[(row + n - queued, column)];
+            }
+        }
+    }
+    closed
 }

@@ -179,11 +179,6 @@ async fn planned<const N: usize>(task: Task<N>) -> Result<(Planned, Reference<N>
     let reference = Reference::known_to(task).await?;
     let (mut candidates, mut has_run) = (Vec::<Candidate>::new(), false);
     for (control, most) in loops {
-        let least = count::whole((reference.whole / most * (1.0 - count::ROUNDING)).ceil());
-        // The number of steps that costs less than the best run so far.
-        let cheapest = candidates.iter().map(|one| one.evaluations).min();
-        let steps = (cheapest.unwrap_or(u64::MAX) - 1) / u64::from(control.method.evaluations());
-        let affordable = steps.min(MAX_STEPS) / reference.count;
         let mut trials = MethodTrials {
             reference: &reference,
             control,
@@ -191,8 +186,9 @@ async fn planned<const N: usize>(task: Task<N>) -> Result<(Planned, Reference<N>
             each: u64::from(control.method.evaluations()),
             best: None,
         };
-        fewest(least, affordable, u64::MAX, &mut trials).await;
-        has_run |= least.max(1) <= affordable;
+        // A run that costs less than the best one so far.
+        let cheapest = candidates.iter().map(|one| one.evaluations).min();
+        has_run |= trials.search(most, cheapest.unwrap_or(u64::MAX) - 1).await;
         candidates.extend(trials.best);
     }
     candidates.sort_by_key(|one| std::cmp::Reverse(one.evaluations));
@@ -226,19 +222,15 @@ async fn own_run<const N: usize>(
         let is_given = control.given_period() > 0.0;
         if is_given { at_period } else { advised }
     };
-    let most = most.unwrap_or(f64::INFINITY);
-    let least = count::whole((reference.whole / most * (1.0 - count::ROUNDING)).ceil());
-    let each = u64::try_from(pair.evaluations()).unwrap_or(u64::MAX);
-    let steps = OWN_COST.saturating_mul(cheapest) / each.max(1);
     let mut trials = MethodTrials {
         reference,
         control,
         run: |control| Box::new(OwnRun::new(control, pair.clone(), reference.task.start)),
-        each,
+        each: u64::try_from(pair.evaluations()).unwrap_or(u64::MAX),
         best: None,
     };
-    let affordable = steps.min(MAX_STEPS) / reference.count;
-    fewest(least, affordable, u64::MAX, &mut trials).await;
+    let most = most.unwrap_or(f64::INFINITY);
+    trials.search(most, OWN_COST.saturating_mul(cheapest)).await;
     trials.best
 }
 
@@ -252,6 +244,20 @@ struct MethodTrials<'a, F, const N: usize> {
     each: u64,
     /// The last run that was accurate enough.
     best: Option<Candidate>,
+}
+
+impl<F, R: Steppable<N> + 'static, const N: usize> MethodTrials<'_, F, N>
+where
+    F: Fn(ControlLoop<N>) -> Box<R> + Send,
+{
+    /// Searches with timesteps up to `longest` \[s\] and at most these evaluations. Returns whether any run is allowed.
+    async fn search(&mut self, longest: f64, evaluations: u64) -> bool {
+        let (whole, wholes) = (self.reference.whole, self.reference.count);
+        let least = count::whole((whole / longest * (1.0 - count::ROUNDING)).ceil());
+        let affordable = (evaluations / self.each.max(1)).min(MAX_STEPS) / wholes;
+        fewest(least, affordable, u64::MAX, self).await;
+        least.max(1) <= affordable
+    }
 }
 
 impl<F, R: Steppable<N> + 'static, const N: usize> StepTrial for &mut MethodTrials<'_, F, N>

@@ -25,60 +25,10 @@ pub struct Tableau {
     b: Vec<f64>,
 }
 
-/// Why a tableau is not accepted. Rows and columns are counted from 0.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TableauError {
-    /// There are no stages, or too many.
-    #[error("b must have 1 to {MAX_STAGES} stages, got {0}")]
-    Stages(usize),
-    /// There is not one row per stage.
-    #[error("a must have as many rows as b has entries, {expected}, got {got}")]
-    Rows {
-        /// The number of stages.
-        expected: usize,
-        /// The number of rows.
-        got: usize,
-    },
-    /// A row is too short or too long.
-    #[error("row {row} of a must have {row} to {stages} entries, got {got}")]
-    Row {
-        /// The row.
-        row: usize,
-        /// The number of stages.
-        stages: usize,
-        /// Its number of entries.
-        got: usize,
-    },
-    /// The method is implicit.
-    #[error(
-        "row {row} of a is implicit: a[{row}][{column}] is {}, and only entries left of the diagonal may differ from 0",
-        Shown(*.value)
-    )]
-    Implicit {
-        /// The row.
-        row: usize,
-        /// The column of the entry.
-        column: usize,
-        /// The entry.
-        value: f64,
-    },
-    /// A coefficient is not finite, or too large.
-    #[error("a coefficient must be between -{LARGEST} and {LARGEST}, got {}", Shown(*.0))]
-    Coefficient(f64),
-    /// There is not one entry for each stage.
-    #[error("{name} must have {stages} entries, one for each stage, got {got}")]
-    Entries {
-        /// The list.
-        name: &'static str,
-        /// The number of stages.
-        stages: usize,
-        /// Its number of entries.
-        got: usize,
-    },
-    /// The tableaus of positions and velocities have different numbers of stages.
-    #[error("the tableaus of q and v must have equally many stages, got {0} and {1}")]
-    Pair(usize, usize),
-}
+/// Why a tableau is not accepted, in words. Rows and columns are counted from 0.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct TableauError(pub(super) String);
 
 /// A coefficient that is typed as a number or as a fraction, such as `1/3`. `None` if it is neither, or not finite.
 pub fn coefficient(text: &str) -> Option<f64> {
@@ -88,6 +38,12 @@ pub fn coefficient(text: &str) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
+/// Rows of coefficients: `;` ends a row. `None` if one is no number.
+pub(crate) fn rows(text: &str) -> Option<Vec<Vec<f64>>> {
+    let row = |row: &str| row.split_whitespace().map(coefficient).collect();
+    text.split(';').map(row).collect()
+}
+
 impl Tableau {
     /// The tableau with the rows of `a`, with or without the zeros on and right of the diagonal.
     ///
@@ -95,31 +51,40 @@ impl Tableau {
     /// The first fault.
     pub fn new(a: &[Vec<f64>], b: &[f64]) -> Result<Self, TableauError> {
         let stages = b.len();
+        let refused = |why| Err(TableauError(why));
         if !(1..=MAX_STAGES).contains(&stages) {
-            return Err(TableauError::Stages(stages));
+            return refused(format!(
+                "b must have 1 to {MAX_STAGES} stages, got {stages}"
+            ));
         }
         if a.len() != stages {
-            return Err(TableauError::Rows {
-                expected: stages,
-                got: a.len(),
-            });
+            let got = a.len();
+            return refused(format!(
+                "a must have as many rows as b has entries, {stages}, got {got}"
+            ));
         }
         for (row, entries) in a.iter().enumerate() {
-            if !(row..=stages).contains(&entries.len()) {
-                return Err(TableauError::Row {
-                    row,
-                    stages,
-                    got: entries.len(),
-                });
+            let got = entries.len();
+            if !(row..=stages).contains(&got) {
+                return refused(format!(
+                    "row {row} of a must have {row} to {stages} entries, got {got}"
+                ));
             }
-            let beyond = entries.iter().enumerate().skip(row);
-            if let Some((column, &value)) = beyond.into_iter().find(|(_, value)| **value != 0.0) {
-                return Err(TableauError::Implicit { row, column, value });
+            let mut beyond = entries.iter().enumerate().skip(row);
+            if let Some((column, value)) = beyond.find(|(_, value)| **value != 0.0) {
+                return refused(format!(
+                    "row {row} of a is implicit: a[{row}][{column}] is {}, and only entries left of the diagonal may \
+                     differ from 0",
+                    Shown(*value)
+                ));
             }
         }
         let mut all = a.iter().flatten().chain(b);
-        if let Some(&bad) = all.find(|it| !(-LARGEST..=LARGEST).contains(*it)) {
-            return Err(TableauError::Coefficient(bad));
+        if let Some(bad) = all.find(|it| !(-LARGEST..=LARGEST).contains(*it)) {
+            return refused(format!(
+                "a coefficient must be between -{LARGEST} and {LARGEST}, got {}",
+                Shown(*bad)
+            ));
         }
         let rows = a.iter().enumerate();
         Ok(Self {
@@ -155,7 +120,11 @@ impl Pair {
         if q.b.len() == v.b.len() {
             Ok(Self { q, v })
         } else {
-            Err(TableauError::Pair(q.b.len(), v.b.len()))
+            Err(TableauError(format!(
+                "the tableaus of q and v must have equally many stages, got {} and {}",
+                q.b.len(),
+                v.b.len()
+            )))
         }
     }
 

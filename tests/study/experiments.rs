@@ -9,7 +9,7 @@ use pendularm::report::experiments::conditioning::{PoseShape, digits_lost};
 use pendularm::report::experiments::design::{
     Feedback, SHORT, designed, limit, limit_of_pid, returned,
 };
-use pendularm::report::experiments::error::swing_of_solvers;
+use pendularm::report::experiments::error::free_swing;
 use pendularm::report::experiments::nonlinear::{
     PeriodicSwing, arrives, is_carried, move_of, spun,
 };
@@ -103,7 +103,7 @@ fn every_kind_of_stiffness_limits_rk4_as_its_rate_says() {
 /// says, and the error follows the tolerance.
 #[test]
 fn adaptive_baselines_follow_their_tolerance() {
-    let task = swing_of_solvers();
+    let task = free_swing().task;
     let dormand_prince5 = Arc::new(Explicit::dormand_prince5().unwrap());
     let dop853 = Arc::new(Explicit::dop853().unwrap());
     for (method, order, steps) in [(dormand_prince5, 5.0, 256), (dop853, 8.0, 64)] {
@@ -132,7 +132,7 @@ fn adaptive_baselines_follow_their_tolerance() {
 /// Semi-implicit Euler has order 1, and a tableau in equal steps gives the live arm's error.
 #[test]
 fn tableaus_in_equal_steps_are_methods() {
-    let task = swing_of_solvers();
+    let task = free_swing().task;
     let explicit = |pair| Solver::Explicit(Arc::new(Explicit::new(pair)));
     let error = |solver: &Solver, steps| task.run(solver.clone(), steps, LOST);
     let semi = explicit(Pair::semi_implicit());

@@ -4,7 +4,9 @@ use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::method::{Analysis, Given, NAMES, amplification, analyse, measure, named};
+use pendularm::study::method::{
+    Analysis, Given, NAMES, Typed, amplification, analyse, measure, named,
+};
 use pendularm::study::paused::at_once;
 use pendularm::study::stability::limit_held;
 use pendularm::study::tableau::{Pair, Tableau, coefficient};
@@ -92,8 +94,14 @@ fn rk4(change: impl Fn(&mut Vec<Vec<f64>>, &mut Vec<f64>)) -> Given {
     let mut a = vec![vec![], vec![0.5], vec![0.0, 0.5], vec![0.0, 0.0, 1.0]];
     let mut b = [1.0, 2.0, 2.0, 1.0].map(|it| it / 6.0).to_vec();
     change(&mut a, &mut b);
-    let given = Given::new(Pair::same(Tableau::new(&a, &b).unwrap()));
-    given.with_times(&[0.0, 0.5, 0.5, 1.0]).unwrap()
+    let c = Some(vec![0.0, 0.5, 0.5, 1.0]);
+    let typed = Typed {
+        a,
+        b,
+        c,
+        ..Typed::default()
+    };
+    Given::try_from(&typed).unwrap()
 }
 
 #[test]
@@ -173,14 +181,20 @@ fn a_bad_tableau_is_refused_with_its_row() {
         "b must have 1 to 12 stages, got 13"
     );
     assert!(refusal(&[vec![]], &[f64::NAN]).starts_with("a coefficient must be between"));
-    let euler = textbook("euler");
+    let euler = |c, b_hat| {
+        let typed = Typed {
+            a: vec![vec![]],
+            b: vec![1.0],
+            c,
+            b_hat,
+            positions: None,
+        };
+        Given::try_from(&typed).unwrap_err().to_string()
+    };
     assert_eq!(
-        euler
-            .clone()
-            .with_times(&[0.0, 1.0])
-            .unwrap_err()
-            .to_string(),
-        "c must have 1 entries, one for each stage, got 2"
+        euler(Some(vec![0.0, 1.0]), None),
+        "c is wrong: c must have 1 entries, one for each stage, got 2"
     );
-    assert!(euler.with_embedded(&[f64::INFINITY]).is_err());
+    let infinite = euler(None, Some(vec![f64::INFINITY]));
+    assert!(infinite.starts_with("b_hat is wrong"), "{infinite}");
 }

@@ -7,7 +7,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::budget::Budget;
 use pendularm::report::experiments::design::{SHORT, designed, limit, limit_of_pid, returned};
-use pendularm::report::experiments::error::{OUTPUTS, scenes, swing_of_solvers};
+use pendularm::report::experiments::error::{OUTPUTS, free_swing, scenes};
 use pendularm::report::experiments::solvers::{Explicit, Solver};
 use pendularm::report::experiments::task::LOST;
 use pendularm::study::control_loop::ControlLoop;
@@ -51,7 +51,7 @@ fn the_timestep_and_the_evaluations_are_runs() {
 
 #[test]
 fn the_evaluations_of_the_baselines_are_runs() {
-    let task = swing_of_solvers();
+    let task = free_swing().task;
     let method = Arc::new(Explicit::dop853().unwrap());
     for (error, rk4, dop853) in [
         (1e-6, "within 10⁻⁶ rad RK4 takes ", "DOP853 "),

@@ -1,4 +1,4 @@
-//! `pendularm report`: files, resuming, refusals. Their contents are tested in the study.
+//! `pendularm report`: files, refusals. Their contents are tested in the study.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -61,34 +61,6 @@ fn several_sections_are_made_and_shown_in_their_order() {
     assert!(verdicts.all(|one| one["holds"] == true), "{report}");
     let csv = fs::read_to_string(out.join("energy-drift.csv")).unwrap();
     assert_eq!(csv.matches(",6e1,").count(), 15);
-}
-
-#[test]
-fn a_section_made_anew_keeps_the_others() {
-    let out = Folder::new("report-resume");
-    let section = out.join("sections/conditioning.json");
-    made(&out, &["conditioning"]);
-    let first = fs::read_to_string(&section).unwrap();
-    let (html, _) = made(&out, &["drift"]);
-    for name in ["conditioning", "drift"] {
-        assert!(html.contains(&format!("<section id=\"{name}\">")), "{name}");
-    }
-    assert_eq!(first, fs::read_to_string(&section).unwrap());
-}
-
-/// Made by another version, or cut: the command must refuse it and not leave it out silently.
-#[test]
-fn an_unreadable_kept_section_is_reported_with_its_file() {
-    let out = Folder::new("report-unreadable");
-    let kept = out.join("sections/drift.json");
-    fs::create_dir_all(kept.parent().unwrap()).unwrap();
-    fs::write(&kept, "{}").unwrap();
-    let error = make(&out, &["conditioning"]).unwrap_err();
-    let said = error.to_string();
-    assert!(said.contains(kept.to_str().unwrap()), "{said}");
-    assert!(said.contains("missing field"), "{said}");
-    // The refusal comes before any section is made, which takes minutes.
-    assert!(!out.join("sections/conditioning.json").exists());
 }
 
 /// The reader's own method is a line of the first figure. A file that is no method is refused with its fault.

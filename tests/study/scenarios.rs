@@ -15,7 +15,7 @@ fn there_are_43_scenes_in_order() {
     }
 }
 
-/// Each scene has a picture of a live arm, or a reason why there is none; a link spells all of the arm's settings.
+/// Each scene has a picture of a live arm, or a reason why there is none.
 #[test]
 fn scenes_are_shown_by_live_arms() {
     let (mut hidden, mut diverged) = (Vec::new(), Vec::new());
@@ -24,18 +24,13 @@ fn scenes_are_shown_by_live_arms() {
             hidden.push(scene.id);
             continue;
         };
-        assert!(watched.samples.len() > 1, "{}", scene.id);
-        let fragment = &watched.fragment;
-        let names = [
-            "links", "method", "timestep", "masses", "period", "position",
-        ];
-        let is_spelled = |name: &str| fragment.contains(&format!("{name}="));
-        assert!(names.into_iter().all(is_spelled), "{fragment}");
-        if watched.diverged {
+        let is_shown = watched.samples.len() > 1 || watched.lost_at.is_some();
+        assert!(is_shown, "{}", scene.id);
+        if watched.lost_at.is_some() {
             diverged.push(scene.id);
         }
     }
-    assert_eq!(hidden, ["S14", "S34", "S35", "S36"]);
+    assert_eq!(hidden, ["S34", "S35", "S36"]);
     // Both are taken, and overflow is reported.
     assert_eq!(diverged, ["S31", "S33"]);
 }

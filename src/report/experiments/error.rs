@@ -5,14 +5,12 @@
 //! **Invariant:** the steps are those of the live arm, bit for bit, wherever the live arm can take them.
 
 use super::reference::{Law, ReferenceMotion};
-use super::solvers::{self, Solver};
-use super::task::{Ready, Task, TaskRun};
+use super::solvers;
+use super::task::Task;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
-use crate::study::beside::Steppable;
-use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::matrix::largest;
@@ -51,7 +49,7 @@ pub struct Scene {
     /// The largest stable timestep \[s\] of each method that has one, as predicted for the control at its setpoint.
     pub(crate) limits: Vec<(Method, f64)>,
     /// The motion.
-    pub task: Task<Method>,
+    pub task: Task,
 }
 
 /// All scenes, in the order in which they are shown.
@@ -62,12 +60,7 @@ pub fn scenes() -> Vec<Scene> {
         velocity: [10.0, 0.0],
     };
     vec![
-        swing::<2>(
-            "swing-2",
-            "Free swing, 2 links",
-            Arm::default(),
-            State::rest(),
-        ),
+        free_swing(),
         swing::<3>(
             "swing-3",
             "Free swing, 3 links",
@@ -96,6 +89,12 @@ pub fn scenes() -> Vec<Scene> {
 /// Simulated time of an arm's scene \[s\].
 const ARM_DURATION: f64 = 2.0;
 
+/// The free swing of 2 links.
+pub fn free_swing() -> Scene {
+    let (arm, start) = (Arm::<2>::default(), State::rest());
+    swing("swing-2", "Free swing, 2 links", arm, start)
+}
+
 fn swing<const N: usize>(
     name: &'static str,
     title: &'static str,
@@ -116,53 +115,34 @@ fn reach(name: &'static str, title: &'static str, sampling: Sampling) -> Scene {
     }
 }
 
-/// The free swing of 2 links for every solver of the report.
-pub fn swing_of_solvers() -> Task<Solver> {
-    let (control, start) = (ControlLoop::free(Arm::default()), State::rest());
-    let ready = move |solver, steps| solvers::ready(&control, start, ARM_DURATION, solver, steps);
-    task(&control, start, Box::new(ready))
-}
-
-/// An arm in motion.
+/// An arm in motion. Its reference has a continuous-time law with integral gains of 0.
 fn arm_scene<const N: usize>(
     (name, title): (&'static str, &'static str),
     control: ControlLoop<N>,
     start: State<N>,
     sampling: Sampling,
 ) -> Scene {
-    let ready = move |method, steps| -> Box<dyn TaskRun> {
-        let timestep = ARM_DURATION / in_f64(steps);
-        let control = control.with_method(method).with_timestep(timestep);
-        let run: Box<dyn Steppable<N>> = match sampling {
-            Sampling::Continuous => Box::new(ContinuousLoop::new(control, start, [0.0; N])),
-            Sampling::Held => Box::new(control.simulation(start)),
-        };
-        Box::new(run)
+    let ready = match sampling {
+        Sampling::Continuous => solvers::ready::<N>,
+        Sampling::Held => solvers::ready_as_live,
     };
+    let law = Law::Continuous(control.gains, control.setpoint);
+    let reference = ReferenceMotion::new(&control.arm, &start, &law, ARM_DURATION);
+    let times = (1..=OUTPUTS).map(|index| ARM_DURATION * in_f64(index) / in_f64(OUTPUTS));
     Scene {
         name,
         title,
         is_held: sampling == Sampling::Held && !control.is_free(),
         limits: Vec::new(),
-        task: task(&control, start, Box::new(ready)),
-    }
-}
-
-/// The task of a motion. Its reference has a continuous-time law with integral gains of 0.
-fn task<S, const N: usize>(
-    control: &ControlLoop<N>,
-    start: State<N>,
-    ready: Box<Ready<S>>,
-) -> Task<S> {
-    let law = Law::Continuous(control.gains, control.setpoint);
-    let reference = ReferenceMotion::new(&control.arm, &start, &law, ARM_DURATION);
-    let times = (1..=OUTPUTS).map(|index| ARM_DURATION * in_f64(index) / in_f64(OUTPUTS));
-    Task {
-        duration: ARM_DURATION,
-        uncertainty: largest(times.map(|time| reference.uncertainty(time))),
-        looks: LOOKS,
-        unit: 1,
-        ready,
-        distance: Box::new(move |time, angles| reference.angle_error(time, angles)),
+        task: Task {
+            duration: ARM_DURATION,
+            uncertainty: largest(times.map(|time| reference.uncertainty(time))),
+            looks: LOOKS,
+            unit: 1,
+            ready: Box::new(move |solver, steps| {
+                ready(&control, start, ARM_DURATION, solver, steps)
+            }),
+            distance: Box::new(move |time, angles| reference.angle_error(time, angles)),
+        },
     }
 }

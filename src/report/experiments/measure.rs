@@ -6,9 +6,6 @@
 //! `½ v M v + ½ x (Kp + ∂G/∂q) x`, which a loop with damping can only lose. A single joint may move further off for a
 //! while.
 //!
-//! The growth per control period is measured by rescaling the deviation to its initial size after every period. Then
-//! only the fastest mode remains. It neither vanishes in rounding nor leaves the linear range.
-//!
 //! **Invariant:** no prediction enters a measurement but the equilibrium and a value to start the search from.
 
 use std::fmt;
@@ -22,7 +19,6 @@ use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Equilibrium, Linear, equilibrium, gravity_gradient};
-use crate::study::matrix::largest;
 use crate::study::stability::{Sampling, Stepping, bisect, largest_timestep};
 
 /// Control periods of a run: a mode that is off the unit circle by 0.1 % changes 50-fold in this time.
@@ -37,13 +33,6 @@ const ESCAPED: f64 = 2e-3;
 
 /// A deviation that has decayed \[rad\]: a hundred thousand units of rounding. Below it rounding would be compared.
 const DEAD: f64 = 1e-11;
-
-/// Periods before counting starts, in which all modes but the fastest fall behind.
-const BEFORE: u32 = 2000;
-
-/// Periods over which the growth is averaged: the phase of the swing at both ends then has an effect of less than 0.1
-/// %.
-const COUNTED: u32 = 4000;
 
 /// Halvings of the search interval; the last one is narrower than 0.005 %.
 const HALVINGS: u32 = 15;
@@ -243,50 +232,6 @@ fn nudged<const N: usize>(control: &ControlLoop<N>, position: &[f64; N]) -> Stat
         nudge *= -0.618;
     }
     state
-}
-
-/// Mean factor by which a deviation grows per control period of `substeps` steps, the effort held over it; the loop's
-/// timestep is the period. `None` if it is not finite.
-pub fn growth_per_period<const N: usize>(control: &ControlLoop<N>, substeps: u32) -> Option<f64> {
-    let period = control.timestep;
-    let control = in_substeps(control, substeps, 0);
-    let rest = equilibrium(&control);
-    let mut live = live_at(&control, &rest, nudged(&control, &rest.position));
-    let mut logarithm = 0.0;
-    for count in 0..BEFORE + COUNTED {
-        live.advance(substeps.into());
-        let State { position, velocity } = *live.state();
-        let integral = live.pid().integral();
-        let moved: [f64; N] = std::array::from_fn(|i| position[i] - rest.position[i]);
-        // An integral without effect only drifts.
-        let acting = control.integrating().map(|acts| f64::from(u8::from(acts)));
-        let gathered: [f64; N] =
-            std::array::from_fn(|i| acting[i] * (integral[i] - rest.integral[i]));
-        let turning = velocity.map(|velocity| period * velocity);
-        let deviation = [moved, turning, gathered];
-        let size = largest(deviation.iter().flatten().map(|value| value.abs()));
-        if live.divergence().is_some() {
-            return None;
-        }
-        if size == 0.0 {
-            return Some(0.0);
-        }
-        let back = NUDGE / size;
-        let scaled = State {
-            position: std::array::from_fn(|i| rest.position[i] + back * moved[i]),
-            velocity: velocity.map(|velocity| velocity * back),
-        };
-        live = Simulation::continued(&Checkpoint {
-            state: scaled,
-            carry: State::rest(),
-            integral: std::array::from_fn(|i| rest.integral[i] + back * gathered[i]),
-            ..live.checkpoint()
-        });
-        if count >= BEFORE {
-            logarithm -= back.ln();
-        }
-    }
-    Some((logarithm / f64::from(COUNTED)).exp())
 }
 
 /// The boundary above which `holds` no longer does, by bisection around `guess`.

@@ -134,26 +134,18 @@ impl PeriodicSwing {
         None
     }
 
-    /// The Floquet multipliers of a method that takes `steps` steps to a period: the eigenvalues of the derivative of
-    /// these steps.
-    pub fn multipliers(&self, method: Method, steps: u32) -> Vec<Complex> {
+    /// Of the Floquet multipliers of a method that takes `steps` steps to a period, the larger modulus of the pair that is
+    /// not 1 of the true swing: the two farthest from 1. They are the eigenvalues of the derivative of these steps.
+    pub fn transverse(&self, method: Method, steps: u32) -> f64 {
         const NUDGE: f64 = 1e-5;
         let h = self.period / f64::from(steps);
         let step = |state, _| state_after(&Arm::<2>::default(), method, &state, &[0.0; 2], h);
         let period = |start: &State<2>| (0..steps).fold(*start, step);
-        derivative(&self.start, [NUDGE; 2], period).eigenvalues()
-    }
-
-    /// The larger modulus of the pair that is not 1 of the true swing: the two farthest from 1.
-    pub fn transverse(&self, method: Method, steps: u32) -> f64 {
-        let mut multipliers = self.multipliers(method, steps);
+        let mut multipliers = derivative(&self.start, [NUDGE; 2], period).eigenvalues();
         let from_one = |mu: &Complex| (mu.re - 1.0).hypot(mu.im);
         multipliers.sort_by(|a, b| from_one(b).total_cmp(&from_one(a)));
-        multipliers
-            .iter()
-            .take(2)
-            .map(|mu| mu.modulus())
-            .fold(0.0, f64::max)
+        let pair = multipliers.iter().take(2);
+        pair.map(|mu| mu.modulus()).fold(0.0, f64::max)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The methods of the live arm, and the baselines of the report beside them, on an arm of 2 links.
+//! The methods of the live arm, and the baselines of the report beside them.
 //!
 //! | baseline | order | steps | stable | evaluations of a step |
 //! | --- | --- | --- | --- | --- |
@@ -21,9 +21,8 @@
 
 use std::sync::Arc;
 
-use super::task::TaskRun;
 use crate::math::arm::State;
-use crate::math::count::in_f64;
+use crate::math::count::{in_f64, length_in_f64};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::{Method, moved};
 use crate::math::simulation::add_carried;
@@ -32,7 +31,7 @@ use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
 use crate::study::matrix::Matrix;
 use crate::study::method::named;
-use crate::study::tableau::{Pair, Tableau, coefficient};
+use crate::study::tableau::{Pair, Tableau, rows};
 use crate::study::taylor::TaylorReference;
 
 /// Most iterations of Newton's method in a step of the implicit midpoint rule.
@@ -53,6 +52,46 @@ pub enum Solver {
     ImplicitMidpoint,
     /// A Rosenbrock method of four stages.
     Rodas3,
+}
+
+impl From<Method> for Solver {
+    fn from(method: Method) -> Self {
+        Self::Fixed(method)
+    }
+}
+
+/// A run of a solver, step by step.
+pub(super) trait TaskRun {
+    /// Takes up to `steps` steps. Returns whether the state is still finite.
+    fn advance(&mut self, steps: u64) -> bool;
+    /// The joint angles \[rad\].
+    fn place(&self) -> &[f64];
+    /// The joint rates \[rad/s\].
+    fn rates(&self) -> &[f64];
+    /// Evaluations of the dynamics so far.
+    fn evaluations(&self) -> u64;
+    /// Steps taken, and the time \[s\], of a solver that chooses its steps.
+    fn chosen(&self) -> Option<(u64, f64)> {
+        None
+    }
+}
+
+impl<const N: usize> TaskRun for Box<dyn Steppable<N>> {
+    fn advance(&mut self, steps: u64) -> bool {
+        (**self).advance(steps) == steps
+    }
+
+    fn place(&self) -> &[f64] {
+        &self.state().position
+    }
+
+    fn rates(&self) -> &[f64] {
+        &self.state().velocity
+    }
+
+    fn evaluations(&self) -> u64 {
+        (**self).evaluations()
+    }
 }
 
 /// An explicit method by its tableaus.
@@ -80,11 +119,6 @@ impl Explicit {
         }
     }
 
-    /// Semi-implicit Euler.
-    pub fn semi_implicit() -> Self {
-        Self::new(Pair::semi_implicit())
-    }
-
     /// Dormand and Prince's method of order 5, whose error is estimated to order 4.
     pub fn dormand_prince5() -> Option<Self> {
         let given = named("dormand_prince5")?;
@@ -98,9 +132,7 @@ impl Explicit {
 
     /// Dormand and Prince's method of order 8. Its error is estimated to orders 5 and 3, which together have order 7.
     pub fn dop853() -> Option<Self> {
-        let row = |row: &str| row.split_whitespace().map(coefficient).collect();
-        let rows = include_str!("dop853.txt").split(';').map(row);
-        let rows: Vec<Vec<f64>> = rows.collect::<Option<_>>()?;
+        let rows = rows(include_str!("dop853.txt"))?;
         let (a, [b, fifth, third]) = rows.split_last_chunk()?;
         Some(Self {
             errors: vec![fifth.clone(), third.clone()],
@@ -110,13 +142,31 @@ impl Explicit {
     }
 }
 
-/// Positions and velocities of both joints.
-type Whole = [f64; 4];
+/// Positions and velocities, or their rates.
+type Whole<const N: usize> = [[f64; N]; 2];
 
-/// A run of a solver with this number of steps, before its first.
-pub(super) fn ready(
-    control: &ControlLoop<2>,
-    start: State<2>,
+/// A run of a solver with this number of steps, before its first. One of the four methods takes the live arm's steps,
+/// whose law holds its effort for a step.
+pub(super) fn ready_as_live<const N: usize>(
+    control: &ControlLoop<N>,
+    start: State<N>,
+    duration: f64,
+    solver: Solver,
+    steps: u64,
+) -> Box<dyn TaskRun> {
+    let Solver::Fixed(method) = solver else {
+        return ready(control, start, duration, solver, steps);
+    };
+    let control = control.with_method(method);
+    let live = control.with_timestep(duration / in_f64(steps));
+    let live: Box<dyn Steppable<N>> = Box::new(live.simulation(start));
+    Box::new(live)
+}
+
+/// The same with a law that acts at every instant.
+pub(super) fn ready<const N: usize>(
+    control: &ControlLoop<N>,
+    start: State<N>,
     duration: f64,
     solver: Solver,
     steps: u64,
@@ -124,7 +174,7 @@ pub(super) fn ready(
     let h = duration / in_f64(steps);
     let control = control.with_timestep(h);
     let explicit = |method: Arc<Explicit>, tolerance: Option<f64>| {
-        let stages = vec![[0.0; 2]; method.pair.stages()];
+        let stages = vec![[0.0; N]; method.pair.stages()];
         Box::new(ExplicitRun {
             control,
             duration,
@@ -141,18 +191,17 @@ pub(super) fn ready(
         })
     };
     let implicit = |step| {
-        let ([a, b], [v, w]) = (start.position, start.velocity);
         Box::new(Implicit {
             control,
             step,
-            y: [a, b, v, w],
+            y: [start.position, start.velocity],
             evaluations: 0,
         })
     };
     match solver {
         Solver::Fixed(method) => {
-            let run = ContinuousLoop::new(control.with_method(method), start, [0.0; 2]);
-            let run: Box<dyn Steppable<2>> = Box::new(run);
+            let run = ContinuousLoop::new(control.with_method(method), start, [0.0; N]);
+            let run: Box<dyn Steppable<N>> = Box::new(run);
             Box::new(run)
         }
         Solver::Explicit(method) => explicit(method, None),
@@ -169,7 +218,7 @@ pub(super) fn ready(
     }
 }
 
-fn acceleration(control: &ControlLoop<2>, q: &[f64; 2], v: &[f64; 2]) -> [f64; 2] {
+fn acceleration<const N: usize>(control: &ControlLoop<N>, q: &[f64; N], v: &[f64; N]) -> [f64; N] {
     let (gains, setpoint) = (&control.gains, &control.setpoint);
     let effort = |i: usize| {
         gains.kp[i] * (setpoint.position[i] - q[i]) + gains.kd[i] * (setpoint.velocity[i] - v[i])
@@ -178,19 +227,19 @@ fn acceleration(control: &ControlLoop<2>, q: &[f64; 2], v: &[f64; 2]) -> [f64; 2
 }
 
 /// The run of a tableau.
-struct ExplicitRun {
-    control: ControlLoop<2>,
+struct ExplicitRun<const N: usize> {
+    control: ControlLoop<N>,
     duration: f64,
     method: Arc<Explicit>,
     /// None for equal steps.
     tolerance: Option<f64>,
     /// Length of the next step \[s\].
     h: f64,
-    state: State<2>,
+    state: State<N>,
     /// The rounding error of the state, as in the live arm.
-    carry: State<2>,
+    carry: State<N>,
     /// The velocities and accelerations of the stages.
-    rates: [Vec<[f64; 2]>; 2],
+    rates: [Vec<[f64; N]>; 2],
     /// The first stage that is not known yet.
     first: usize,
     steps: u64,
@@ -199,13 +248,13 @@ struct ExplicitRun {
 }
 
 /// `h Σ weight · rate`.
-fn combined(h: f64, weights: &[f64], rates: &[[f64; 2]]) -> [f64; 2] {
+fn combined<const N: usize>(h: f64, weights: &[f64], rates: &[[f64; N]]) -> [f64; N] {
     let pairs = weights.iter().zip(rates).filter(|it| *it.0 != 0.0);
-    let sum = pairs.fold([0.0; 2], |sum, (weight, rate)| moved(&sum, *weight, rate));
+    let sum = pairs.fold([0.0; N], |sum, (weight, rate)| moved(&sum, *weight, rate));
     sum.map(|sum| h * sum)
 }
 
-impl ExplicitRun {
+impl<const N: usize> ExplicitRun<N> {
     /// Evaluates the stages of a step of `h` \[s\].
     fn evaluate(&mut self, h: f64) {
         let (pair, [velocities, accelerations]) = (&self.method.pair, &mut self.rates);
@@ -226,8 +275,8 @@ impl ExplicitRun {
 
     /// The estimated error of a step of `h` \[s\] to `next`, in units of the tolerance: the root of the mean square of all
     /// positions and velocities.
-    fn error(&self, h: f64, next: &State<2>, tolerance: f64) -> f64 {
-        let pairs = |now: &[f64; 2], next: &[f64; 2]| -> [f64; 2] {
+    fn error(&self, h: f64, next: &State<N>, tolerance: f64) -> f64 {
+        let pairs = |now: &[f64; N], next: &[f64; N]| -> [f64; N] {
             std::array::from_fn(|i| tolerance * (1.0 + now[i].abs().max(next[i].abs())))
         };
         let scales = [
@@ -237,9 +286,9 @@ impl ExplicitRun {
         let squares = self.method.errors.iter().map(|weights| {
             let parts = self.rates.iter().zip(&scales).flat_map(|(rates, scale)| {
                 let error = combined(h, weights, rates);
-                [error[0] / scale[0], error[1] / scale[1]]
+                std::array::from_fn::<f64, N, _>(|i| error[i] / scale[i])
             });
-            parts.map(|part| part * part).sum::<f64>() / 4.0
+            parts.map(|part| part * part).sum::<f64>() / length_in_f64(2 * N)
         });
         match squares.collect::<Vec<_>>()[..] {
             [one] => one.sqrt(),
@@ -282,7 +331,7 @@ impl ExplicitRun {
     }
 }
 
-impl TaskRun for ExplicitRun {
+impl<const N: usize> TaskRun for ExplicitRun<N> {
     fn advance(&mut self, steps: u64) -> bool {
         let is_over = |it: &Self| it.tolerance.is_some() && it.time >= it.duration;
         (0..steps).all(|_| is_over(self) || self.step())
@@ -306,20 +355,20 @@ impl TaskRun for ExplicitRun {
 }
 
 /// The run of Taylor series, of a free arm.
-struct TaylorRun {
-    control: ControlLoop<2>,
+struct TaylorRun<const N: usize> {
+    control: ControlLoop<N>,
     duration: f64,
-    motion: TaylorReference<2>,
+    motion: TaylorReference<N>,
     /// The rest of the time \[s\].
     left: f64,
     steps: u64,
 }
 
-impl TaskRun for TaylorRun {
+impl<const N: usize> TaskRun for TaylorRun<N> {
     fn advance(&mut self, steps: u64) -> bool {
         for _ in 0..steps {
             if self.left > 0.0 {
-                self.left = self.motion.step(&self.control.arm, &[0.0; 2]);
+                self.left = self.motion.step(&self.control.arm, &[0.0; N]);
                 self.steps += 1;
             }
         }
@@ -344,29 +393,29 @@ impl TaskRun for TaylorRun {
 }
 
 /// The run of an implicit method.
-struct Implicit {
-    control: ControlLoop<2>,
+struct Implicit<const N: usize> {
+    control: ControlLoop<N>,
     /// The change in a step; none where it can't be computed.
-    step: fn(&mut Self) -> Option<Whole>,
-    y: Whole,
+    step: fn(&mut Self) -> Option<Whole<N>>,
+    y: Whole<N>,
     evaluations: u64,
 }
 
-impl TaskRun for Implicit {
+impl<const N: usize> TaskRun for Implicit<N> {
     fn advance(&mut self, steps: u64) -> bool {
         (0..steps).all(|_| {
-            let change = (self.step)(self).unwrap_or([f64::NAN; 4]);
-            self.y = moved(&self.y, 1.0, &change);
-            self.y.iter().all(|y| y.is_finite())
+            let change = (self.step)(self).unwrap_or([[f64::NAN; N]; 2]);
+            self.y = plus(&self.y, 1.0, &change);
+            self.y.as_flattened().iter().all(|y| y.is_finite())
         })
     }
 
     fn place(&self) -> &[f64] {
-        &self.y[..2]
+        &self.y[0]
     }
 
     fn rates(&self) -> &[f64] {
-        &self.y[2..]
+        &self.y[1]
     }
 
     fn evaluations(&self) -> u64 {
@@ -374,67 +423,73 @@ impl TaskRun for Implicit {
     }
 }
 
-impl Implicit {
-    fn slope(&mut self, y: &Whole) -> Whole {
+/// `y + factor · k`.
+fn plus<const N: usize>(y: &Whole<N>, factor: f64, k: &Whole<N>) -> Whole<N> {
+    std::array::from_fn(|part| moved(&y[part], factor, &k[part]))
+}
+
+/// The solution of `matrix · x = right`.
+fn solved<const N: usize>(matrix: &Matrix, right: &Whole<N>) -> Option<Whole<N>> {
+    let mut x = *right;
+    x.as_flattened_mut()
+        .copy_from_slice(&matrix.solve(right.as_flattened())?);
+    Some(x)
+}
+
+impl<const N: usize> Implicit<N> {
+    fn slope(&mut self, y: &Whole<N>) -> Whole<N> {
         self.evaluations += 1;
-        let v = [y[2], y[3]];
-        let a = acceleration(&self.control, &[y[0], y[1]], &v);
-        [v[0], v[1], a[0], a[1]]
+        let [q, v] = y;
+        [*v, acceleration(&self.control, q, v)]
     }
 
     /// `f` at the present state, and `∂f/∂y` by differences.
-    fn jacobian(&mut self) -> (Whole, Matrix) {
+    fn jacobian(&mut self) -> (Whole<N>, Matrix) {
         let y = self.y;
         let f = self.slope(&y);
-        let mut jacobian = Matrix::zeros(4);
-        for column in 0..4 {
-            let nudge = 1e-7 * (1.0 + y[column].abs());
+        let mut jacobian = Matrix::zeros(2 * N);
+        for (column, at) in y.as_flattened().iter().enumerate() {
             let mut near = y;
-            near[column] += nudge;
-            let moved = self.slope(&near);
-            for row in 0..4 {
-                jacobian[(row, column)] = (moved[row] - f[row]) / (near[column] - y[column]);
+            let there = at + 1e-7 * (1.0 + at.abs());
+            near.as_flattened_mut()[column] = there;
+            let changes = plus(&self.slope(&near), -1.0, &f);
+            for (row, change) in changes.as_flattened().iter().enumerate() {
+                jacobian[(row, column)] = change / (there - at);
             }
         }
         (f, jacobian)
     }
 
-    fn midpoint(&mut self) -> Option<Whole> {
+    fn midpoint(&mut self) -> Option<Whole<N>> {
         let (y, h) = (self.y, self.control.timestep);
         let (mut k, jacobian) = self.jacobian();
         let newton = jacobian.scaled(-0.5 * h).plus_diagonal(1.0);
         for _ in 0..MAX_ITERATIONS {
-            let f = self.slope(&moved(&y, 0.5 * h, &k));
-            let left: Vec<f64> = (0..4).map(|i| f[i] - k[i]).collect();
-            let change: Whole = newton.solve(&left)?.try_into().ok()?;
-            k = moved(&k, 1.0, &change);
-            if (0..4).all(|i| (h * change[i]).abs() <= 1e-13 * (1.0 + y[i].abs())) {
+            let f = self.slope(&plus(&y, 0.5 * h, &k));
+            let change = solved(&newton, &plus(&f, -1.0, &k))?;
+            k = plus(&k, 1.0, &change);
+            let mut pairs = change.as_flattened().iter().zip(y.as_flattened());
+            if pairs.all(|(change, y)| (h * change).abs() <= 1e-13 * (1.0 + y.abs())) {
                 break;
             }
         }
-        Some(k.map(|k| h * k))
+        Some(k.map(|k| k.map(|k| h * k)))
     }
 
     /// In the form `(I/(γh) - J) k = f(y + …) + …/h`, γ = 1/2.
-    fn rodas3(&mut self) -> Option<Whole> {
+    fn rodas3(&mut self) -> Option<Whole<N>> {
         let (y, h) = (self.y, self.control.timestep);
         let (start, jacobian) = self.jacobian();
-        let matrix = Matrix::from_fn(4, |i, j| {
-            let diagonal = if i == j { 2.0 / h } else { 0.0 };
-            diagonal - jacobian[(i, j)]
-        });
-        let stage = |f: &Whole, others: &Whole| -> Option<Whole> {
-            let right: Vec<f64> = (0..4).map(|i| f[i] + others[i] / h).collect();
-            matrix.solve(&right)?.try_into().ok()
-        };
-        let k1 = stage(&start, &[0.0; 4])?;
-        let k2 = stage(&start, &k1.map(|k| 4.0 * k))?;
-        let f3 = self.slope(&moved(&y, 2.0, &k1));
-        let k3 = stage(&f3, &std::array::from_fn(|i| k1[i] - k2[i]))?;
-        let ahead = moved(&moved(&y, 2.0, &k1), 1.0, &k3);
-        let f4 = self.slope(&ahead);
-        let others = std::array::from_fn(|i| k1[i] - k2[i] - 8.0 / 3.0 * k3[i]);
-        let k4 = stage(&f4, &others)?;
-        Some(std::array::from_fn(|i| 2.0 * k1[i] + k3[i] + k4[i]))
+        let matrix = jacobian.scaled(-1.0).plus_diagonal(2.0 / h);
+        let stage = |f: &Whole<N>, others: &Whole<N>| solved(&matrix, &plus(f, 1.0 / h, others));
+        let k1 = stage(&start, &[[0.0; N]; 2])?;
+        let k2 = stage(&start, &k1.map(|k| k.map(|k| 4.0 * k)))?;
+        let f3 = self.slope(&plus(&y, 2.0, &k1));
+        let apart = plus(&k1, -1.0, &k2);
+        let k3 = stage(&f3, &apart)?;
+        let change = plus(&k1.map(|k| k.map(|k| 2.0 * k)), 1.0, &k3);
+        let f4 = self.slope(&plus(&y, 1.0, &change));
+        let k4 = stage(&f4, &plus(&apart, -8.0 / 3.0, &k3))?;
+        Some(plus(&change, 1.0, &k4))
     }
 }

@@ -63,7 +63,7 @@ pub struct StiffScene {
     /// The elbow's rate per that of the swing.
     pub ratio: f64,
     /// The motion, whose reference is known at eight instants.
-    pub task: Task<Solver>,
+    pub task: Task,
 }
 
 /// The pose at the start \[rad\].

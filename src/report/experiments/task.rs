@@ -8,8 +8,8 @@
 //! steps the same timesteps.
 
 use super::reference::DoubleDouble;
+use super::solvers::{Solver, TaskRun};
 use crate::math::count::in_f64;
-use crate::study::beside::Steppable;
 use crate::study::fewest::fewest;
 use crate::study::paused::at_once;
 
@@ -27,34 +27,16 @@ pub struct RunOutcome {
     pub evaluations: u64,
     /// Largest error over all comparisons and joints \[rad\]; infinite if the run was lost or left the finite numbers.
     pub error: f64,
-    /// The last angles, summed \[rad\].
-    pub end: f64,
-}
-
-/// A run of a task, step by step.
-pub(super) trait TaskRun {
-    /// Takes up to `steps` steps. Returns whether the state is still finite.
-    fn advance(&mut self, steps: u64) -> bool;
-    /// The joint angles \[rad\].
-    fn place(&self) -> &[f64];
-    /// The joint rates \[rad/s\].
-    fn rates(&self) -> &[f64];
-    /// Evaluations of the dynamics so far.
-    fn evaluations(&self) -> u64;
-    /// Steps taken, and the time \[s\], of a solver that chooses its steps.
-    fn chosen(&self) -> Option<(u64, f64)> {
-        None
-    }
 }
 
 /// Makes the run of a solver with this number of steps ready.
-pub(super) type Ready<S> = dyn Fn(S, u64) -> Box<dyn TaskRun>;
+pub(super) type Ready = dyn Fn(Solver, u64) -> Box<dyn TaskRun>;
 
 /// The distance of a place to the reference at a time \[s\].
 type Distance = dyn Fn(DoubleDouble, &[f64]) -> f64;
 
-/// A motion to be computed by solvers `S`.
-pub struct Task<S> {
+/// A motion to be computed.
+pub struct Task {
     /// Simulated time \[s\].
     pub duration: f64,
     /// How far the reference itself may be off \[rad\].
@@ -63,16 +45,16 @@ pub struct Task<S> {
     pub(super) looks: u64,
     /// The number of steps of every run is a multiple of this.
     pub(super) unit: u64,
-    pub(super) ready: Box<Ready<S>>,
+    pub(super) ready: Box<Ready>,
     pub(super) distance: Box<Distance>,
 }
 
-impl<S: Clone> Task<S> {
+impl Task {
     /// Takes `steps` steps and compares. A run whose error exceeds `most` ends there and counts as lost. A solver that
     /// chooses its steps may try as many, and is lost if they do not reach the end.
-    pub fn run(&self, solver: S, steps: u64, most: f64) -> RunOutcome {
+    pub fn run(&self, solver: impl Into<Solver>, steps: u64, most: f64) -> RunOutcome {
         let every = steps.div_ceil(self.looks).max(1);
-        let mut run = (self.ready)(solver, steps);
+        let mut run = (self.ready)(solver.into(), steps);
         let timestep = self.duration / in_f64(steps);
         let (mut done, mut error, mut is_over) = (0, 0.0_f64, false);
         while error.is_finite() && !is_over {
@@ -97,7 +79,6 @@ impl<S: Clone> Task<S> {
             timestep: self.duration / in_f64(steps),
             evaluations: run.evaluations(),
             error,
-            end: run.place().iter().sum(),
         }
     }
 
@@ -105,12 +86,12 @@ impl<S: Clone> Task<S> {
     /// to a `part` of them: see [`fewest`].
     pub fn fewest(
         &self,
-        solver: S,
+        solver: impl Into<Solver>,
         most: f64,
         (first, last): (u64, u64),
         part: u64,
     ) -> Option<RunOutcome> {
-        let mut best = None;
+        let (solver, mut best) = (solver.into(), None);
         at_once(fewest(first, last / self.unit, part, |units| {
             let made = self.run(solver.clone(), units * self.unit, most);
             let is_enough = made.error <= most;
@@ -120,28 +101,10 @@ impl<S: Clone> Task<S> {
         best
     }
 
-    /// The same steps without comparing: [`RunOutcome::end`].
-    pub fn replay(&self, solver: S, steps: u64) -> f64 {
+    /// The same steps without comparing. Returns the last angles, summed \[rad\].
+    pub fn replay(&self, solver: Solver, steps: u64) -> f64 {
         let mut run = (self.ready)(solver, steps);
         run.advance(steps);
         run.place().iter().sum()
-    }
-}
-
-impl<const N: usize> TaskRun for Box<dyn Steppable<N>> {
-    fn advance(&mut self, steps: u64) -> bool {
-        (**self).advance(steps) == steps
-    }
-
-    fn place(&self) -> &[f64] {
-        &self.state().position
-    }
-
-    fn rates(&self) -> &[f64] {
-        &self.state().velocity
-    }
-
-    fn evaluations(&self) -> u64 {
-        (**self).evaluations()
     }
 }

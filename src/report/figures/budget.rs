@@ -14,19 +14,19 @@ const DURATION: f64 = 2.0;
 const METHODS: [Method; 3] = [Method::Euler, Method::Verlet, Method::Rk4];
 
 /// A part of the error: its legend key and its value.
-type ErrorPart = (fn() -> Key, fn(&Parts) -> f64);
+type ErrorPart = (Key, fn(&Parts) -> f64);
 
-const METHOD: fn() -> Key = || Key::line("c1", "truncation (the method)").marked(Marker::Diamond);
-const DIGITS: fn() -> Key = || Key::line("c3", "rounding (53 bits)").marked(Marker::Circle);
-const PERIOD: fn() -> Key = || Key::line("c2", "control hold (the period)").marked(Marker::Square);
-const TOTAL: fn() -> Key = || Key::line("ink", "total").dashed();
-
-const PARTS: [ErrorPart; 4] = [
-    (METHOD, |parts| parts.truncation),
-    (DIGITS, |parts| parts.rounding),
-    (PERIOD, |parts| parts.hold),
-    (TOTAL, |parts| parts.total),
-];
+fn parts() -> [ErrorPart; 4] {
+    let truncation = Key::line("c1", "truncation (the method)").marked(Marker::Diamond);
+    let rounding = Key::line("c3", "rounding (53 bits)").marked(Marker::Circle);
+    let hold = Key::line("c2", "control hold (the period)").marked(Marker::Square);
+    [
+        (truncation, |parts| parts.truncation),
+        (rounding, |parts| parts.rounding),
+        (hold, |parts| parts.hold),
+        (Key::line("ink", "total").dashed(), |parts| parts.total),
+    ]
+}
 
 pub(super) fn make(section: &mut Section) {
     let halvings = section.choose(9, 5);
@@ -66,11 +66,11 @@ fn figure(section: &mut Section, scenes: &[(&str, &Vec<Vec<Parts>>)]) {
     let mut panels = Vec::new();
     for (scene, runs) in scenes {
         for (index, method) in METHODS.iter().enumerate() {
-            let parts: Vec<&Parts> = runs.iter().filter_map(|run| run.get(index)).collect();
+            let runs: Vec<&Parts> = runs.iter().filter_map(|run| run.get(index)).collect();
             let plot = Plot::new(format!("{scene}, {method}"), x.clone(), y.clone());
-            panels.push(plot.with(PARTS.map(|(key, of)| {
-                let points = parts.iter().map(|parts| (parts.timestep, of(parts)));
-                Curve::line(key(), points.filter(|point| point.1 != 0.0))
+            panels.push(plot.with(parts().map(|(key, of)| {
+                let points = runs.iter().map(|parts| (parts.timestep, of(parts)));
+                Curve::line(key, points.filter(|point| point.1 != 0.0))
             })));
         }
     }

@@ -18,17 +18,17 @@ const POSES: [(&str, PoseShape); 3] = [
 ];
 
 /// A solver: its legend key and its worst loss.
-type Way = (fn() -> Key, fn(&Lost) -> f64);
+type Way = (Key, fn(&Lost) -> f64);
 
-const DENSE: fn() -> Key = || Key::line("c2", "elimination of M(q)").marked(Marker::Square);
-const INHERENT: fn() -> Key = || Key::line("soft", "inherent").dashed();
-const RECURSION: fn() -> Key = || Key::line("c1", "this arm's recursion").marked(Marker::Diamond);
-
-const WAYS: [Way; 3] = [
-    (DENSE, |lost| lost.dense),
-    (INHERENT, |lost| lost.inherent),
-    (RECURSION, |lost| lost.recursion),
-];
+fn ways() -> [Way; 3] {
+    let dense = Key::line("c2", "elimination of M(q)").marked(Marker::Square);
+    let recursion = Key::line("c1", "this arm's recursion").marked(Marker::Diamond);
+    [
+        (dense, |lost| lost.dense),
+        (Key::line("soft", "inherent").dashed(), |lost| lost.inherent),
+        (recursion, |lost| lost.recursion),
+    ]
+}
 
 pub(super) fn make(section: &mut Section) {
     let count = section.choose(400, 60);
@@ -67,14 +67,15 @@ pub(super) fn make(section: &mut Section) {
         format!("at worst {} digits beyond", number(own)),
         own <= ALLOWED,
     );
-    let panels = poses.map(|(title, lost)| {
-        let x = "mass of the last link / mass of the others";
-        let x = Axis::log(x, Unit::Number, (1e-9, 1e9));
-        let y = Axis::linear("digits lost, of 16", (0.0, 12.0));
-        Plot::new(title, x, y).with(WAYS.map(|(key, of)| {
-            Curve::line(key(), lost.iter().map(|(ratio, lost)| (*ratio, of(lost))))
-        }))
-    });
+    let panels =
+        poses.map(|(title, lost)| {
+            let x = "mass of the last link / mass of the others";
+            let x = Axis::log(x, Unit::Number, (1e-9, 1e9));
+            let y = Axis::linear("digits lost, of 16", (0.0, 12.0));
+            Plot::new(title, x, y).with(ways().map(|(key, of)| {
+                Curve::line(key, lost.iter().map(|(ratio, lost)| (*ratio, of(lost))))
+            }))
+        });
     section.figure(
         "conditioning",
         &format!(

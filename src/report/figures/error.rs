@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::fit::slope;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
-use crate::report::experiments::error::{OUTPUTS, REACH, Scene, scenes, swing_of_solvers};
+use crate::report::experiments::error::{OUTPUTS, REACH, Scene, scenes};
 use crate::report::experiments::solvers::{Explicit, Solver};
 use crate::report::experiments::task::{LOST, RunOutcome, Task};
 use crate::report::section::Section;
@@ -17,6 +17,7 @@ use crate::report::svg::{
 };
 use crate::report::timing::{RUNS, Time, time};
 use crate::study::matrix::largest;
+use crate::study::tableau::Pair;
 
 /// Range of errors for a slope's fit \[rad\]: above it higher orders matter, below it rounding.
 const ASYMPTOTIC: std::ops::Range<f64> = 1e-11..1e-3;
@@ -70,7 +71,7 @@ pub(super) fn make(section: &mut Section) {
     let halvings = section.choose(12, 8);
     let scenes = scenes().into_iter();
     let data: Vec<Data> = scenes.map(|scene| Data::new(scene, halvings)).collect();
-    let baselines = baselines(section, halvings.min(HALVINGS));
+    let baselines = baselines(section, &data, halvings.min(HALVINGS));
     findings(section, &data);
     adaptive(section, &data, &baselines);
     verdicts(section, &data);
@@ -78,71 +79,47 @@ pub(super) fn make(section: &mut Section) {
     against_timestep(section, &data);
 }
 
-/// The baselines on the free swing of 2 links.
-fn baselines(section: &Section, halvings: u32) -> Vec<Baseline> {
-    let task = swing_of_solvers();
-    let equal = |solver: Solver| -> Vec<(Solver, u64)> {
+/// The baselines on the free swing of 2 links, which is the first scene.
+fn baselines(section: &Section, data: &[Data], halvings: u32) -> Vec<Baseline> {
+    let Some(swing) = data.first() else {
+        return Vec::new();
+    };
+    let (mut all, task) = (Vec::new(), &swing.scene.task);
+    let mut add = |class, marker, label: &str, runs: &mut dyn Iterator<Item = (Solver, u64)>| {
+        let runs = runs.map(|(solver, steps)| Run::of(task, &solver, steps));
+        let key = Key::line(class, label).marked(marker).dashed();
+        all.push((key, runs.collect()));
+    };
+    let equal = |solver: Solver| {
         let steps = (0..=halvings).map(|halving| OUTPUTS << halving);
-        steps.map(|steps| (solver.clone(), steps)).collect()
+        steps.map(move |steps| (solver.clone(), steps))
     };
-    let explicit = |method| equal(Solver::Explicit(Arc::new(method)));
-    let within = |solver: &dyn Fn(f64) -> Solver| -> Vec<(Solver, u64)> {
-        let tolerances = (4..=28).map(|half| 10_f64.powf(-0.5 * f64::from(half)));
-        tolerances
-            .map(|tolerance| (solver(tolerance), MOST_TRIED))
-            .collect()
-    };
-    let mut all = vec![
-        (
-            "c3",
-            Marker::Circle,
-            "semi-implicit Euler",
-            explicit(Explicit::semi_implicit()),
-        ),
-        (
-            "soft",
-            Marker::Down,
-            "implicit midpoint",
-            equal(Solver::ImplicitMidpoint),
-        ),
-        ("soft", Marker::Plus, "Rodas3", equal(Solver::Rodas3)),
-        (
-            "c4",
-            Marker::Triangle,
-            "Taylor series, adaptive",
-            within(&Solver::Taylor),
-        ),
-    ];
-    for (marker, label, method) in [
-        (
-            Marker::Square,
-            "Dormand-Prince 5, adaptive",
-            Explicit::dormand_prince5(),
-        ),
-        (Marker::Diamond, "DOP853, adaptive", Explicit::dop853()),
-    ] {
-        let method = method.map(Arc::new);
-        let of = |method: Arc<Explicit>| {
-            within(&move |tolerance| Solver::Adaptive(method.clone(), tolerance))
+    let explicit = |pair| equal(Solver::Explicit(Arc::new(Explicit::new(pair))));
+    let tolerances = || (4..=28).map(|half| 10_f64.powf(-0.5 * f64::from(half)));
+    let semi_implicit = &mut explicit(Pair::semi_implicit());
+    let midpoint = &mut equal(Solver::ImplicitMidpoint);
+    let taylor = &mut tolerances().map(|tolerance| (Solver::Taylor(tolerance), MOST_TRIED));
+    add("c3", Marker::Circle, "semi-implicit Euler", semi_implicit);
+    add("soft", Marker::Down, "implicit midpoint", midpoint);
+    add("soft", Marker::Plus, "Rodas3", &mut equal(Solver::Rodas3));
+    add("c4", Marker::Triangle, "Taylor series, adaptive", taylor);
+    let order5 = (
+        Marker::Square,
+        "Dormand-Prince 5, adaptive",
+        Explicit::dormand_prince5(),
+    );
+    let order8 = (Marker::Diamond, "DOP853, adaptive", Explicit::dop853());
+    for (marker, label, method) in [order5, order8] {
+        let Some(method) = method.map(Arc::new) else {
+            continue;
         };
-        all.extend(method.map(|method| ("ink", marker, label, of(method))));
+        let within = |tolerance| (Solver::Adaptive(method.clone(), tolerance), MOST_TRIED);
+        add("ink", marker, label, &mut tolerances().map(within));
     }
     if let Some((name, pair)) = &section.own {
-        all.push((
-            "c2",
-            Marker::Plus,
-            name,
-            explicit(Explicit::new(pair.clone())),
-        ));
+        add("c2", Marker::Plus, name, &mut explicit(pair.clone()));
     }
-    let all = all.into_iter().map(|(class, marker, label, runs)| {
-        let key = Key::line(class, label).marked(marker).dashed();
-        let runs = runs
-            .iter()
-            .map(|(solver, steps)| Run::of(&task, solver, *steps));
-        (key, runs.collect())
-    });
-    all.collect()
+    all
 }
 
 impl Data {
@@ -150,7 +127,7 @@ impl Data {
         let runs = Method::ALL.map(|method| {
             let steps = (0..=halvings).map(|halving| OUTPUTS << halving);
             steps
-                .map(|steps| Run::of(&scene.task, &method, steps))
+                .map(|steps| Run::of(&scene.task, &method.into(), steps))
                 .collect()
         });
         Self { scene, runs }
@@ -181,7 +158,7 @@ impl Data {
 }
 
 impl Run {
-    fn of<S: Clone>(task: &Task<S>, solver: &S, steps: u64) -> Self {
+    fn of(task: &Task, solver: &Solver, steps: u64) -> Self {
         Self {
             outcome: task.run(solver.clone(), steps, LOST),
             time: time(|| task.replay(solver.clone(), steps)),

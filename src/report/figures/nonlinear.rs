@@ -10,7 +10,7 @@ use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number};
 use crate::study::control_loop::ControlLoop;
 use crate::study::motion::Motion;
-use crate::study::stability::{ADVISED_PART, limit_held, limits};
+use crate::study::stability::{ADVISED_PART, bisect, limit_held, limits};
 
 /// A kind of motion: its name, its second axis, and the ends of the axes (timestep \[s\], amplitude or speed).
 struct Kind {
@@ -146,12 +146,10 @@ fn floquet(section: &mut Section) {
         first.and_then(|first| Some((SWINGS.get(first.checked_sub(1)?)?, SWINGS.get(first)?)));
     let swing = "**The slow periodic swing of the free 2-link arm is stable";
     section.findings.push(match (ends, SWINGS.last().zip(multipliers.last().copied().flatten())) {
-        (Some((&(mut stable), &(mut unstable))), Some((last, multiplier))) => {
-            for _ in 0..4 {
-                let middle = 0.5 * (stable + unstable);
-                let is_unstable = multiplier_at(middle).is_none_or(|it| it > UNSTABLE);
-                *(if is_unstable { &mut unstable } else { &mut stable }) = middle;
-            }
+        (Some((stable, unstable)), Some((last, multiplier))) => {
+            let stable = bisect((*stable, *unstable), 4, |amplitude| {
+                multiplier_at(amplitude).is_some_and(|it| it <= UNSTABLE)
+            });
             format!(
                 "{swing} up to {} rad at the first joint**. In it both links turn to the same side. A \
                  deviation grows {}-fold in a period at {} rad, so there no method is accurate for long.",

@@ -65,8 +65,8 @@ pub(super) fn make(section: &mut Section) {
         "The stiff and extreme scenes, each as one live arm",
         "Joint angles from their start, by the live arm's own steps. The scale is that of the largest angle, which is \
          written below. A cross marks the end of a run that diverged. Below: the duration, the largest angle, and \
-         whether the scene agrees with theory; the table has the details. A name opens the arm on the page of a \
-         running program at 127.0.0.1:9095, which applies the settings on a click.",
+         whether the scene agrees with theory; the table has the details. The step Stiff and extreme of the page runs \
+         each of them.",
         &panels,
     );
     section.table(&table);
@@ -75,16 +75,14 @@ pub(super) fn make(section: &mut Section) {
 /// Class and name of each joint's line.
 const JOINTS: [(&str, &str); 3] = [("j1", "joint 1"), ("j2", "joint 2"), ("j3", "joint 3")];
 
-/// The page that a picture's name opens.
-const PAGE: &str = "http://127.0.0.1:9095/#";
-
 /// Joint angles over time of the scene's live arm, or the reason why there are none.
 fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Plot {
     let watched = live.watch();
     let samples = watched.as_ref().map_or(&[][..], |watched| &watched.samples);
     let angles = samples.iter().flat_map(|(_, angles)| angles);
     let largest = largest(angles.map(|angle| angle.abs()));
-    let end = samples.last().map_or(0.0, |(time, _)| *time);
+    let lost = watched.as_ref().ok().and_then(|watched| watched.lost_at);
+    let end = lost.or(samples.last().map(|it| it.0)).unwrap_or(0.0);
     let [width, reach] = [end, largest].map(|it| if it > 0.0 { it } else { 1.0 });
     let x = Axis::linear("time [s]", (0.0, width));
     let y = Axis::linear("angle from the start [rad]", (-reach, reach));
@@ -94,21 +92,18 @@ fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Plot {
         let points = points.filter_map(|(time, angles)| Some((*time, *angles.get(joint)?)));
         plot.add(Curve::line(Key::line(class, label), points));
     }
-    let diverged = watched.as_ref().is_ok_and(|watched| watched.diverged);
-    let lasted = if diverged { end } else { live.seconds() };
-    if diverged {
-        let lost = [(end, f64::INFINITY)];
-        plot.add(Curve::dots(Key::line("ink", ""), lost));
-    }
-    let (link, note) = match watched {
-        Ok(watched) => (
-            format!("{PAGE}{}", watched.fragment),
-            format!("{}, ±{} rad", seconds(lasted), number(largest)),
-        ),
-        Err(why) => (String::new(), why),
+    plot.add(Curve::dots(
+        Key::line("ink", ""),
+        lost.map(|time| (time, f64::INFINITY)),
+    ));
+    let note = match watched {
+        Ok(_) => {
+            let lasted = lost.unwrap_or(live.seconds());
+            format!("{}, ±{} rad", seconds(lasted), number(largest))
+        }
+        Err(why) => why,
     };
     plot.thumbnail = Some(Thumbnail {
-        link,
         note,
         verdict: verdict(holds),
     });

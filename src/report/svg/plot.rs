@@ -23,8 +23,6 @@ pub struct Plot {
 /// The texts of a thumbnail.
 #[derive(Debug, Clone)]
 pub(crate) struct Thumbnail {
-    /// The address that its title opens; empty for none.
-    pub(crate) link: String,
     /// The words below it on the left.
     pub(crate) note: String,
     /// Class and words below it on the right.
@@ -106,10 +104,6 @@ impl Plot {
         let title: String = title
             .map(|(y, line)| text("title", (left, y), "start", &line))
             .collect();
-        let title = match thumbnail.link.as_str() {
-            "" => title,
-            link => format!("<a href=\"{}\">{title}</a>", escape(link)),
-        };
         let (class, verdict) = thumbnail.verdict;
         title
             + &text("note", (left, below), "start", &thumbnail.note)

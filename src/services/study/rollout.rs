@@ -146,7 +146,7 @@ impl<const N: usize> RolloutWork<N> {
         let run = |is_alone: bool| {
             let (ask, made) = (ask.clone(), made.clone());
             Paused::new(async move {
-                let mut request = request(&ask, &present)?;
+                let mut request = ask.request(&present)?;
                 if is_alone {
                     (request.samples, request.reference) = (2, false);
                 }
@@ -213,29 +213,28 @@ impl<const N: usize> Work<RunAnswer<N>> for RolloutWork<N> {
     }
 }
 
-/// The request for the run, with the present settings for missing fields.
-fn request<const N: usize>(
-    ask: &RunOffline<N>,
-    present: &Present<N>,
-) -> Result<RolloutRequest<N>, ArmError> {
-    let control = &present.control;
-    let arm = arm_of(ask.params.as_ref(), control.arm)?;
-    let gains = ask.gains.as_ref();
-    let setpoint = ask.setpoint.map(Setpoint::at);
-    Ok(RolloutRequest {
-        control: ask.robot.applied_to(ControlLoop {
-            arm,
-            // Without gains there is no control.
-            gains: gains.map_or(no_control(), |gains| gains.applied_to(&Gains::default())),
-            setpoint: setpoint.unwrap_or(control.setpoint),
-            method: ask.method.unwrap_or(control.method),
-            timestep: ask.timestep.unwrap_or(control.timestep),
-            period: with_period(control.period, ask.control_period),
-            ..*control
-        })?,
-        start: state_of(ask.q, ask.qd, &present.state),
-        duration: ask.duration.unwrap_or(DEFAULT_DURATION),
-        samples: ask.samples.unwrap_or(DEFAULT_SAMPLES),
-        reference: ask.reference.unwrap_or(false),
-    })
+impl<const N: usize> RunOffline<N> {
+    /// The request for the run, with the present settings for missing fields.
+    pub(crate) fn request(&self, present: &Present<N>) -> Result<RolloutRequest<N>, ArmError> {
+        let control = &present.control;
+        let arm = arm_of(self.params.as_ref(), control.arm)?;
+        let gains = self.gains.as_ref();
+        let setpoint = self.setpoint.map(Setpoint::at);
+        Ok(RolloutRequest {
+            control: self.robot.applied_to(ControlLoop {
+                arm,
+                // Without gains there is no control.
+                gains: gains.map_or(no_control(), |gains| gains.applied_to(&Gains::default())),
+                setpoint: setpoint.unwrap_or(control.setpoint),
+                method: self.method.unwrap_or(control.method),
+                timestep: self.timestep.unwrap_or(control.timestep),
+                period: with_period(control.period, self.control_period),
+                ..*control
+            })?,
+            start: state_of(self.q, self.qd, &present.state),
+            duration: self.duration.unwrap_or(DEFAULT_DURATION),
+            samples: self.samples.unwrap_or(DEFAULT_SAMPLES),
+            reference: self.reference.unwrap_or(false),
+        })
+    }
 }

@@ -8,7 +8,7 @@ use libm::{atan2, hypot};
 
 use super::HeldLoop;
 use crate::math::shown::Shown;
-use crate::study::critical::shape;
+use crate::study::critical::{fastest, shape};
 use crate::study::matrix::{Complex, Matrix};
 use crate::study::paused::pause;
 use crate::study::stability::{NEUTRAL, bisect_in_pieces, first_unstable_until};
@@ -116,19 +116,11 @@ impl HeldLoop {
         self.growth(period) <= NEUTRAL
     }
 
-    /// The eigenvalue of largest modulus of the matrix of a period, less 1.
-    fn fastest(&self, period: f64) -> Option<Complex> {
-        let growth = |mu: &Complex| 2.0 * mu.re + mu.modulus() * mu.modulus();
-        let values = self.generator(period).eigenvalues().into_iter();
-        values
-            .filter(|mu| mu.modulus() != 0.0)
-            .max_by(|one, other| growth(one).total_cmp(&growth(other)))
-    }
-
     fn critical(&self, period: f64) -> Option<CriticalMode> {
-        let mu = self.fastest(period)?;
+        let generator = self.generator(period);
+        let mu = fastest(&generator, 1.0)?;
         let (re, im) = (1.0 + mu.re, mu.im);
-        let shape = shape(&self.generator(period), mu)?;
+        let shape = shape(&generator, mu)?;
         let position = |j: usize| {
             let sum = |part: fn(&Complex) -> f64| {
                 let along = (0..self.joints()).zip(&shape);
@@ -159,7 +151,7 @@ impl HeldLoop {
     }
 
     async fn at(&self, period: f64) -> AtPeriod {
-        let fastest = self.fastest(period);
+        let fastest = fastest(&self.generator(period), 1.0);
         let growth_per_period = fastest.map_or(1.0, |mu| hypot(1.0 + mu.re, mu.im));
         let is_stable = self.is_stable(period);
         let mut steps = 1;

@@ -45,72 +45,19 @@ pub struct Given {
     pub steps: u64,
 }
 
-/// Why a loop is not accepted. Rows and columns are counted from 0.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum HeldError {
-    /// There are no joints, or too many.
-    #[error("M must have 1 to {MAX_JOINTS} rows, got {0}")]
-    Joints(usize),
-    /// The size of a matrix does not fit.
-    #[error("{name} must have {joints} rows of {joints} numbers, as M has rows{or}")]
-    Size {
-        /// The matrix.
-        name: &'static str,
-        /// The number of joints.
-        joints: usize,
-        /// The other forms, in words.
-        or: &'static str,
-    },
-    /// A number is not finite.
-    #[error("{name} must be finite: {name}[{row}][{column}] is {value}")]
-    NotFinite {
-        /// The matrix.
-        name: &'static str,
-        /// The row.
-        row: usize,
-        /// The column.
-        column: usize,
-        /// The entry.
-        value: f64,
-    },
-    /// The mass matrix is not symmetric.
-    #[error(
-        "M must be symmetric: M[{row}][{column}] is {}, M[{column}][{row}] is {}",
-        shown_against(*.one, *.other),
-        shown_against(*.other, *.one)
-    )]
-    NotSymmetric {
-        /// The row.
-        row: usize,
-        /// The column.
-        column: usize,
-        /// The entry there.
-        one: f64,
-        /// The entry on the other side of the diagonal.
-        other: f64,
-    },
-    /// The mass matrix is not positive definite.
-    #[error("M must be positive definite: it has no inertia left at joint[{0}]")]
-    NotPositive(usize),
-    /// The delay is too long.
-    #[error("delay must be 0 to {MAX_DELAY} periods, got {0}")]
-    Delay(u64),
-    /// There are no steps in a period, or too many.
-    #[error("steps must be 1 to {MAX_STEPS}, got {0}")]
-    Steps(u64),
-    /// There are too many states.
-    #[error(
-        "the loop must have at most {most} states, got {got}: 2 for each joint, 1 for each integral, 1 for each joint and period of delay"
-    )]
-    States {
-        /// The number of states.
-        got: usize,
-        /// Its limit.
-        most: usize,
-    },
-    /// The period is not a length of time.
-    #[error("period must be finite and greater than 0, got {}", Shown(*.0))]
-    Period(f64),
+/// Why a loop is not accepted, in words. Rows and columns are counted from 0.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct HeldError(String);
+
+impl HeldError {
+    /// For a period that is not a length of time.
+    pub fn period(period: f64) -> Self {
+        Self(format!(
+            "period must be finite and greater than 0, got {}",
+            Shown(period)
+        ))
+    }
 }
 
 impl TryFrom<&Given> for HeldLoop {
@@ -119,12 +66,18 @@ impl TryFrom<&Given> for HeldLoop {
     fn try_from(given: &Given) -> Result<Self, HeldError> {
         let n = given.mass.len();
         if !(1..=MAX_JOINTS).contains(&n) {
-            return Err(HeldError::Joints(n));
+            let why = format!("M must have 1 to {MAX_JOINTS} rows, got {n}");
+            return Err(HeldError(why));
         }
-        let delay = Some(given.delay).filter(|it| *it <= MAX_DELAY);
-        let delay = delay.ok_or(HeldError::Delay(given.delay))?;
-        let steps = Some(given.steps).filter(|it| (1..=MAX_STEPS).contains(it));
-        let steps = steps.ok_or(HeldError::Steps(given.steps))?;
+        let (delay, steps) = (given.delay, given.steps);
+        if delay > MAX_DELAY {
+            let why = format!("delay must be 0 to {MAX_DELAY} periods, got {delay}");
+            return Err(HeldError(why));
+        }
+        if !(1..=MAX_STEPS).contains(&steps) {
+            let why = format!("steps must be 1 to {MAX_STEPS}, got {steps}");
+            return Err(HeldError(why));
+        }
         let mass = symmetric(&full("M", &given.mass, n)?)?;
         let either = |name, rows: &Vec<Vec<f64>>| matrix(name, rows, n);
         let (kp, kd) = (either("kp", &given.kp)?, either("kd", &given.kd)?);
@@ -141,10 +94,14 @@ impl TryFrom<&Given> for HeldLoop {
         };
         let held = Self {
             // Both are in range.
-            delay: usize::try_from(delay).unwrap_or_default(),
+            delay: u8::try_from(delay).unwrap_or_default(),
             steps: u32::try_from(steps).unwrap_or(1),
             between: given.between.clone(),
-            ..Self::new(matrices).map_err(HeldError::NotPositive)?
+            ..Self::new(matrices).map_err(|joint| {
+                HeldError(format!(
+                    "M must be positive definite: it has no inertia left at joint[{joint}]"
+                ))
+            })?
         };
         held.within(MAX_STATES)
     }
@@ -158,7 +115,10 @@ impl HeldLoop {
     pub fn within(self, most: usize) -> Result<Self, HeldError> {
         let got = self.states();
         if got > most {
-            return Err(HeldError::States { got, most });
+            return Err(HeldError(format!(
+                "the loop must have at most {most} states, got {got}: 2 for each joint, 1 for each integral, 1 for each \
+                 joint and period of delay"
+            )));
         }
         Ok(self)
     }
@@ -184,25 +144,18 @@ fn matrix(name: &'static str, rows: &[Vec<f64>], n: usize) -> Result<Matrix, Hel
 
 fn full(name: &'static str, rows: &[Vec<f64>], n: usize) -> Result<Matrix, HeldError> {
     if rows.len() != n || rows.iter().any(|row| row.len() != n) {
-        return Err(HeldError::Size {
-            name,
-            joints: n,
-            or: if name == "M" {
-                ""
-            } else {
-                ", or one number for each joint, or one for all"
-            },
-        });
+        let or = match name {
+            "M" => "",
+            _ => ", or one number for each joint, or one for all",
+        };
+        let why = format!("{name} must have {n} rows of {n} numbers, as M has rows{or}");
+        return Err(HeldError(why));
     }
     for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
         let value = rows[row][column];
         if !value.is_finite() {
-            return Err(HeldError::NotFinite {
-                name,
-                row,
-                column,
-                value,
-            });
+            let why = format!("{name} must be finite: {name}[{row}][{column}] is {value}");
+            return Err(HeldError(why));
         }
     }
     Ok(Matrix::from_fn(n, |row, column| rows[row][column]))
@@ -214,12 +167,11 @@ fn symmetric(mass: &Matrix) -> Result<Matrix, HeldError> {
     for (row, column) in (0..n).flat_map(|row| (0..row).map(move |column| (row, column))) {
         let (one, other) = (mass[(row, column)], mass[(column, row)]);
         if (one - other).abs() > SYMMETRIC * one.abs().max(other.abs()) {
-            return Err(HeldError::NotSymmetric {
-                row,
-                column,
-                one,
-                other,
-            });
+            return Err(HeldError(format!(
+                "M must be symmetric: M[{row}][{column}] is {}, M[{column}][{row}] is {}",
+                shown_against(one, other),
+                shown_against(other, one)
+            )));
         }
     }
     Ok(Matrix::from_fn(n, |i, j| {

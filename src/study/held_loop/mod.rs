@@ -25,6 +25,7 @@ mod given;
 
 pub use self::answer::{AtPeriod, CriticalMode, HeldLimit, held_limit};
 pub use self::given::{Given, HeldError, MAX_DELAY, MAX_JOINTS, MAX_STATES, MAX_STEPS};
+use super::linear::fed_back;
 use super::matrix::Matrix;
 use super::stability::{Modes, growth, repeated, runge_kutta};
 use super::tableau::Pair;
@@ -81,7 +82,7 @@ pub struct HeldLoop {
     /// The joints that have an integral.
     integrals: Vec<usize>,
     /// Whole periods by which an effort is late.
-    delay: usize,
+    delay: u8,
     between: Between,
     /// Steps of the method in a period.
     steps: u32,
@@ -156,7 +157,7 @@ impl HeldLoop {
 
     /// Number of states: positions, velocities, efforts on their way, integrals.
     pub fn states(&self) -> usize {
-        (2 + self.delay) * self.joints() + self.integrals.len()
+        (2 + usize::from(self.delay)) * self.joints() + self.integrals.len()
     }
 
     /// The same loop with another number of steps in a period.
@@ -281,7 +282,7 @@ impl HeldLoop {
     /// with the next one first, and integrals, in the units of the period.
     pub fn generator(&self, period: f64) -> Matrix {
         let (n, plant) = (self.joints(), self.plant(period));
-        let (queue, integrals) = (2 * n, (2 + self.delay) * n);
+        let integrals = self.states() - self.integrals.len();
         let kp = self.scaled.kp.clone().plus(period, &self.scaled.ki);
         let kp = kp.scaled(period * period);
         let kd = self.scaled.kd.clone().scaled(period);
@@ -297,32 +298,7 @@ impl HeldLoop {
         {
             law[(j, integrals + k)] = cube * self.integral_gains[(j, joint)];
         }
-        let mut closed = Matrix::zeros(self.states());
-        for row in 0..2 * n {
-            for column in 0..2 * n {
-                closed[(row, column)] = plant[(row, column)];
-            }
-            for j in 0..n {
-                let effect = plant[(row, 2 * n + j)];
-                if self.delay > 0 {
-                    closed[(row, queue + j)] = effect;
-                } else {
-                    for column in 0..self.states() {
-                        closed[(row, column)] += effect * law[(j, column)];
-                    }
-                }
-            }
-        }
-        for row in queue..integrals {
-            closed[(row, row)] = -1.0;
-            if row + n < integrals {
-                closed[(row, row + n)] = 1.0;
-            } else {
-                for column in 0..self.states() {
-                    closed[(row, column)] += law[(row + n - integrals, column)];
-                }
-            }
-        }
+        let mut closed = fed_back(&plant, &law, self.delay, 1.0);
         for (k, &joint) in self.integrals.iter().enumerate() {
             for i in 0..n {
                 closed[(integrals + k, i)] = -self.axes[(joint, i)];
@@ -344,8 +320,7 @@ impl HeldLoop {
             axes: Matrix::zeros(1),
             ..self.clone()
         };
-        let late = u32::try_from(self.delay).map_or(f64::INFINITY, f64::from);
-        late + 1.0 - one.plant(1.0)[(0, 2)]
+        f64::from(self.delay) + 1.0 - one.plant(1.0)[(0, 2)]
     }
 }
 

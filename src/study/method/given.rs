@@ -56,14 +56,26 @@ impl TryFrom<&Typed> for Given {
             }
             None => Pair::same(v),
         };
-        let mut given = Self::new(pair);
+        // `c` and `b_hat` have one finite entry for each stage, as `b` has.
+        let beside = |name, entries: &[f64]| {
+            let (stages, got) = (typed.b.len(), entries.len());
+            if got != stages {
+                let why =
+                    format!("{name} must have {stages} entries, one for each stage, got {got}");
+                return Err(at(name)(TableauError(why)));
+            }
+            Tableau::new(&typed.a, entries).map_err(at(name))
+        };
         if let Some(c) = &typed.c {
-            given = given.with_times(c).map_err(at("c"))?;
+            beside("c", c)?;
         }
-        match &typed.b_hat {
-            Some(b_hat) => given.with_embedded(b_hat).map_err(at("b_hat")),
-            None => Ok(given),
-        }
+        let b_hat = typed.b_hat.as_ref();
+        let embedded = b_hat.map(|b_hat| beside("b_hat", b_hat)).transpose()?;
+        Ok(Self {
+            pair,
+            c: typed.c.clone(),
+            embedded: embedded.map(Pair::same),
+        })
     }
 }
 
@@ -86,37 +98,6 @@ impl Given {
     #[cfg(feature = "report")]
     pub(crate) const fn embedded(&self) -> Option<&Pair> {
         self.embedded.as_ref()
-    }
-
-    /// The same with the times of the stages, to which the rows of `a` are compared.
-    ///
-    /// # Errors
-    /// There is not one finite time for each stage.
-    pub fn with_times(self, c: &[f64]) -> Result<Self, TableauError> {
-        self.beside("c", c)?;
-        let c = Some(c.to_vec());
-        Ok(Self { c, ..self })
-    }
-
-    /// A tableau with the `a` of the velocities and these entries.
-    fn beside(&self, name: &'static str, entries: &[f64]) -> Result<Tableau, TableauError> {
-        let (stages, got) = (self.pair.stages(), entries.len());
-        if got != stages {
-            return Err(TableauError::Entries { name, stages, got });
-        }
-        Tableau::new(self.pair.v().a(), entries)
-    }
-
-    /// The same with the weights of an embedded method, which has the `a` of the velocities.
-    ///
-    /// # Errors
-    /// There is not one finite weight for each stage.
-    pub fn with_embedded(self, b_hat: &[f64]) -> Result<Self, TableauError> {
-        let embedded = Pair::same(self.beside("b_hat", b_hat)?);
-        Ok(Self {
-            embedded: Some(embedded),
-            ..self
-        })
     }
 }
 

@@ -230,16 +230,11 @@ fn follow<const N: usize>(
     pieces
 }
 
-/// The piece at `time` \[s\], and the time since its beginning \[s\].
-fn at<const N: usize>(pieces: &[Piece<N>], time: Real) -> (&Piece<N>, Real) {
-    let after = pieces.partition_point(|piece| (piece.begins - time).to_f64() <= 0.0);
-    let piece = &pieces[after.saturating_sub(1)];
-    (piece, time - piece.begins)
-}
-
 /// The joint angles at `time` \[s\].
 fn angles<const N: usize>(pieces: &[Piece<N>], time: Real) -> [Real; N] {
-    let (piece, after) = at(pieces, time);
+    let begun = pieces.partition_point(|piece| (piece.begins - time).to_f64() <= 0.0);
+    let piece = &pieces[begun.saturating_sub(1)];
+    let after = time - piece.begins;
     let change = piece.change.iter().rev();
     let change = change.fold([Real::ZERO; N], |sum, term| {
         plus(&sum, term).map(|sum| sum * after)

@@ -8,10 +8,12 @@ use super::support::{
     Check, Noise, Observation, apart, arm, each, fastest, free, gains, held, is_near, states,
 };
 use crate::math::arm::{Arm, State};
+use crate::math::count::in_f64;
 use crate::math::dynamics::{energy, forward_dynamics};
 use crate::math::integrator::Method;
-use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
-use crate::math::simulation::state_after;
+use crate::math::limits::Limits;
+use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
+use crate::math::simulation::Simulation;
 use crate::report::experiments::conditioning::digits_lost;
 use crate::report::experiments::error::REACH_GAINS as MODERATE;
 use crate::report::experiments::measure::{
@@ -20,7 +22,7 @@ use crate::report::experiments::measure::{
 use crate::report::experiments::nonlinear::derivative;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Linear, equilibrium};
-use crate::study::matrix::largest;
+use crate::study::matrix::{largest, largest_difference};
 use crate::study::stability::{Sampling, Stepping, largest_timestep, limits, step_matrix};
 
 /// Digits that a rod arm may lose: a half-unit change of an angle alone changes accelerations by up to 1.6 digits.
@@ -83,6 +85,25 @@ fn predicted_rate(linear: &Linear, method: Method) -> f64 {
     step.spectral_radius().ln() / 0.001
 }
 
+/// The rate at which an arm leaves `rest` \[1/s\]: from its largest distance in a `window` of steps, after some steps, to
+/// that in a window this many steps later.
+fn growth_rate<const N: usize>(
+    live: &mut Simulation<N>,
+    rest: &[f64; N],
+    (after, later): (u64, u64),
+    window: u64,
+) -> f64 {
+    let mut largest_after = |steps| {
+        live.advance(steps);
+        largest((0..window).map(|_| {
+            live.step();
+            largest_difference(&live.state().position, rest)
+        }))
+    };
+    let (early, late) = (largest_after(after), largest_after(later - window));
+    (late / early).ln() / (in_f64(later) * live.timestep())
+}
+
 /// `-π/2` is no double, so the arm hangs 6e-17 rad off and swings by that much.
 fn hanging_at_rest() -> Observation {
     let start = State::at_rest([-FRAC_PI_2, 0.0, 0.0]);
@@ -96,16 +117,8 @@ fn hanging_at_rest() -> Observation {
     });
     let predicted = predicted_rate(&linear, Method::Euler);
     let mut simulation = swinging(Method::Euler);
-    // The largest within a second, longer than the fastest swing.
-    let mut largest_after = |steps| {
-        simulation.advance(steps);
-        largest((0..1000).map(|_| {
-            simulation.step();
-            apart(simulation.state(), &start)
-        }))
-    };
-    let (early, late) = (largest_after(200_000), largest_after(199_000));
-    let rate = (late / early).ln() / 200.0;
+    // A second is longer than the fastest swing.
+    let rate = growth_rate(&mut simulation, &start.position, (200_000, 200_000), 1000);
     let words = format!("Euler grows by {rate:.5}/s, predicted {predicted:.5}/s");
     let grows = (is_near(Some(rate), predicted, 0.02), words);
     each(drifts.into_iter().chain([grows]))
@@ -119,13 +132,8 @@ fn upright() -> Observation {
     each([eigenvalue].into_iter().chain(Method::ALL.map(|method| {
         let start = State::at_rest([pose[0] + 1e-12, 1e-12]);
         let mut simulation = free(Arm::default(), start, method, 0.001);
-        let mut off = |steps| {
-            simulation.advance(steps);
-            (simulation.state().position[0] - pose[0]).abs()
-        };
         // After two seconds the fastest mode has outgrown the other one a few thousand times.
-        let (early, late) = (off(2000), off(1000));
-        let rate = (late / early).ln();
+        let rate = growth_rate(&mut simulation, &pose, (2000, 1000), 1);
         let predicted = predicted_rate(&linear, method);
         let order = (unstable * 0.001).powi(method.order().cast_signed());
         let holds =
@@ -320,35 +328,29 @@ fn late_control() -> Observation {
     (is_less && late.agrees(), words)
 }
 
-/// The shipped law has no cap on the effort; this scene puts one behind it.
 fn windup() -> Observation {
-    const CAP: f64 = 10.0;
-    const H: f64 = 0.001;
-    let blocked = held(gains(100.0, 50.0, [20.0; 2]), [0.0; 2]);
-    let mut pid = Pid::new(blocked.gains);
-    pid.enable(true);
-    pid.set_setpoint(blocked.setpoint);
-    let mut state = State::at_rest([-1.5, 0.0]);
-    let mut unlimited = 0.0;
-    let mut advance = |pid: &mut Pid<2>, steps: u32| {
-        for _ in 0..steps {
-            let control = pid.control(&state, H);
-            pid.commit(control.integral);
-            unlimited += (pid.setpoint().position[0] - state.position[0]) * H;
-            let effort = control.effort.map(|effort| effort.clamp(-CAP, CAP));
-            state = state_after(&blocked.arm, Method::Rk4, &state, &effort, H);
-        }
-        (state, unlimited)
+    let control = ControlLoop {
+        limits: Limits {
+            effort: Some([10.0; 2]),
+            ..Limits::default()
+        },
+        ..held(gains(100.0, 50.0, [20.0; 2]), [0.0; 2])
     };
-    let (_, wound) = advance(&mut pid, 60_000);
-    let limited = pid.integral()[0];
+    let mut live = control.simulation(State::at_rest([-1.5, 0.0]));
+    let mut wound = 0.0;
+    for _ in 0..60_000 {
+        wound -= live.state().position[0] * control.timestep;
+        live.step();
+    }
+    let limited = live.pid().integral()[0];
     // Hanging needs no effort. The integral has to be unwound by the opposite error first.
     let goal = [-FRAC_PI_2, 0.0];
-    pid.set_setpoint(Setpoint::at(goal));
+    live.set_setpoint(Setpoint::at(goal));
     let recovered = (1..=600_u32).find(|_| {
-        let (state, _) = advance(&mut pid, 1000);
-        let is_near = (0..2).all(|i| (state.position[i] - goal[i]).abs() < 0.02);
-        is_near && state.velocity.iter().all(|v| v.abs() < 0.02)
+        live.advance(1000);
+        let State { position, velocity } = live.state();
+        let is_near = (0..2).all(|i| (position[i] - goal[i]).abs() < 0.02);
+        is_near && velocity.iter().all(|v| v.abs() < 0.02)
     });
     let back = recovered.map_or_else(|| "never".to_owned(), |s| format!("after {s} s"));
     let integrals = format!("integral {limited:.1} rad s, unlimited {wound:.1}");
@@ -359,6 +361,8 @@ fn windup() -> Observation {
 }
 
 fn too_much_integral() -> Observation {
+    /// Steps of two swings. The measurement begins after two such windows, when other modes have died out.
+    const WINDOW: u64 = 20_000;
     let control = held(gains(100.0, 2000.0, [20.0; 2]), POSE);
     let linear = Linear::at_setpoint(&control);
     let limits = Sampling::ALL.map(|sampling| largest_timestep(&linear, Method::Rk4, sampling));
@@ -366,7 +370,12 @@ fn too_much_integral() -> Observation {
     let Some(mode) = modes.iter().max_by(|a, b| a.re.total_cmp(&b.re)) else {
         return (false, "no modes".to_owned());
     };
-    let rate = growth_rate(&control, TAU / mode.im.abs());
+    let rest = equilibrium(&control);
+    let mut start = State::at_rest(rest.position);
+    start.position[0] += 1e-9;
+    let timestep = 2.0 * TAU / mode.im.abs() / in_f64(WINDOW);
+    let mut live = live_at(&control.with_timestep(timestep), &rest, start);
+    let rate = growth_rate(&mut live, &rest.position, (2 * WINDOW, WINDOW), WINDOW);
     let eigenvalue = mode.re;
     (
         limits == [Some(0.0); 2] && eigenvalue > 0.0 && is_near(Some(rate), eigenvalue, 0.02),
@@ -375,24 +384,6 @@ fn too_much_integral() -> Observation {
             short(limits[0])
         ),
     )
-}
-
-/// How fast a small swing of the given period grows, in the live loop's way \[1/s\]. It is measured from the largest
-/// deviation within two periods to that within the next two, once other modes have died out.
-fn growth_rate(control: &ControlLoop<2>, swing: f64) -> f64 {
-    const STEPS: u32 = 20_000;
-    let h = 2.0 * swing / f64::from(STEPS);
-    let rest = equilibrium(control);
-    let mut start = State::at_rest(rest.position);
-    start.position[0] += 1e-9;
-    let mut live = live_at(&control.with_timestep(h), &rest, start);
-    let windows = [(); 4].map(|()| {
-        largest((0..STEPS).map(|_| {
-            live.step();
-            (live.state().position[0] - rest.position[0]).abs()
-        }))
-    });
-    (windows[3] / windows[2]).ln() / (2.0 * swing)
 }
 
 // ---- S16 to S26: uneven arms ---------------------------------------------------------------------------------------

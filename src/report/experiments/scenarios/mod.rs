@@ -1,9 +1,9 @@
 //! Named scenes, stiff and extreme, each with an expectation, an observation, and whether they agree.
 //!
 //! Expectations come from theory or from the arm's own prediction, except the rates of S05 and S06, which are from
-//! earlier runs: two chaotic swings have no other. Some are verdicts of the study alone: efforts that are capped or
-//! late, and arms that the contract allows but a careful user would not. A scene that falls short says so. `scenes.txt`
-//! has the expectations. `page/scenes.js` has the names, and a live arm for each.
+//! earlier runs: two chaotic swings have no other. Some arms are allowed by the contract, but a careful user would not
+//! make them. A scene that falls short says so. `scenes.txt` has the expectations. `page/scenes.js` has the names, and
+//! a live arm for each.
 //!
 //! **Invariant:** 43 scenes, in order, each deterministic and bounded; `slow` ones take seconds. Random values
 //! come from a seed in the source.
