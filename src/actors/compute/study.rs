@@ -17,8 +17,8 @@ use crate::actors::arm::sim::{ArmSettings, HeldLimit};
 use crate::actors::node::{Call, Nodes, Reply, Unserved};
 use crate::protocol::catalog::Service;
 pub use crate::services::study::{
-    AnalyseMethod, Beside, FindHeldLimit, IntegrationStep, PlanRun, PlannedRun, PredictStability,
-    Predicted, Ran, Refused, RunOffline, SuggestGains, Suggested,
+    AnalyseMethod, Beside, Changed, FindHeldLimit, IntegrationStep, PlanRun, PlannedRun,
+    PredictStability, Predicted, Ran, Refused, RunOffline, SuggestGains, Suggested,
 };
 use crate::services::study::{Computed, Integrating, Work};
 use crate::study::clocks::{ClockLimits, clock_limits};

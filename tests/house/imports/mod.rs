@@ -1,4 +1,4 @@
-//! Imports of the source, file by file: no cycle between files, none between folders, and only allowed layers. The
+//! Imports and impls of the source, file by file: the functions of a type in one file, no cycle between files, none between folders, and only allowed layers. The
 //! layers of the bridge to ROS 2 are not checked.
 //!
 //! **Rule:** an arrow runs from the file that names an item to the file that defines it. `mod` and `pub use` only
@@ -9,4 +9,5 @@
 mod arrows;
 mod cycles;
 mod files;
+mod impls;
 mod layers;
