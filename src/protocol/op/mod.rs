@@ -9,9 +9,9 @@
 mod control;
 pub mod fields;
 mod members;
+mod parse;
 mod problems;
 mod providers;
-mod read;
 #[cfg(feature = "runtime")]
 pub mod token;
 mod types;
@@ -19,8 +19,8 @@ mod types;
 use std::time::Duration;
 
 pub use self::members::OPS;
+pub use self::parse::{read, read_raw, read_start};
 pub use self::problems::{OpError, Problem};
-pub use self::read::{read, read_raw, read_start};
 pub use self::types::{
     ActionGoal, Compression, Encoding, GoalStatus, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT,
     ProviderOp, Served, Subscribe, Verbosity,
