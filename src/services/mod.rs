@@ -35,15 +35,15 @@ macro_rules! writer {
 /// `whole` request are all valid, or it is rejected. Of the others each field is checked alone: an invalid one never
 /// prevents a valid one from taking effect, and the request has the rejections.
 macro_rules! request {
-    (whole $(#[$about:meta])* pub struct $request:ident<$n:ident> -> $answer:ty, |$fields:ident| {
+    (whole $(#[$about:meta])* pub struct $request:ident$(<$n:ident>)? -> $answer:ty, |$fields:ident| {
         $($(#[$doc:meta])* $field:ident: $kind:ty = $read:expr,)*
     } $($write:tt)*) => {
         $(#[$about])*
-        pub struct $request<const $n: usize> {
+        pub struct $request$(<const $n: usize>)? {
             $($(#[$doc])* pub $field: $kind,)*
         }
 
-        impl<const $n: usize> $crate::services::Ask for $request<$n> {
+        impl$(<const $n: usize>)? $crate::services::Ask for $request$(<$n>)? {
             type Answer = $answer;
 
             fn read(

@@ -1,5 +1,5 @@
-//! Imports and impls of the source, file by file: the functions of a type in one file, no cycle between files, none between folders, and only allowed layers. The
-//! layers of the bridge to ROS 2 are not checked.
+//! Imports of the source, file by file: no cycle between files, none between folders, and only allowed layers. The
+//! layers of the bridge to ROS 2 are not checked. Also impls: the own functions of a type are in one file.
 //!
 //! **Rule:** an arrow runs from the file that names an item to the file that defines it. `mod` and `pub use` only
 //! declare or re-export: they are no arrows, and re-exported names are followed. Unit tests may name any item.

@@ -6,20 +6,20 @@ use std::time::Duration;
 
 use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
-use tokio::time::{Instant, sleep_until, timeout};
+use tokio::time::{Instant, sleep_until, timeout, timeout_at};
 
-use super::admission::first_frame;
+use super::admission::{ClientSession, MAX_AUTH_BYTES, Opened};
 #[cfg(feature = "web")]
 use super::http;
-use super::session::{ClientSession, Opened};
-use super::transport::{ClientStream, Transport};
+use super::transport::{ClientStream, Transport, read_some};
 use crate::actors::gateway::limits::{FRAME_TIME, HEAD_TIME, OPENING_TIME, READ_BYTES};
 use crate::actors::resources::places::Refused;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::token::{AuthError, authenticate};
+use crate::protocol::op::{self, Incoming};
 #[cfg(feature = "web")]
 use crate::protocol::wire::frame::Foreign;
-use crate::protocol::wire::frame::{Opening, opening};
+use crate::protocol::wire::frame::{FrameReader, Opening, opening};
 use crate::protocol::wire::json::Payload;
 
 /// The result of the detection by a client's first bytes.
@@ -169,6 +169,32 @@ async fn detect<S: AsyncRead + Unpin>(
         };
         if read.unwrap_or(0) == 0 {
             return Detected::Frames;
+        }
+    }
+}
+
+/// Reads a first frame until `due`. All bytes read stay in `first`. Returns its op and its `id`, or why there is no frame.
+async fn first_frame<S: AsyncRead + Unpin>(
+    stream: &mut S,
+    first: &mut BytesMut,
+    due: Instant,
+) -> Result<Incoming, AuthError> {
+    let mut frames = FrameReader::new();
+    let mut seen = 0;
+    loop {
+        frames.push(first.get(seen..).unwrap_or_default());
+        seen = first.len();
+        if let Some(frame) = frames.next() {
+            let frame = frame.map_err(|_| AuthError::NotShown)?;
+            return Ok(op::read(&frame.text));
+        }
+        if seen > MAX_AUTH_BYTES {
+            return Err(AuthError::TooMuch(MAX_AUTH_BYTES));
+        }
+        match timeout_at(due, read_some(stream, first)).await {
+            Err(_) => return Err(AuthError::TooLate(HEAD_TIME)),
+            Ok(Ok(0) | Err(_)) => return Err(AuthError::NotShown),
+            Ok(Ok(_)) => {}
         }
     }
 }

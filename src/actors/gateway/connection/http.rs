@@ -10,7 +10,7 @@ use std::task::{Poll, ready};
 use bytes::BytesMut;
 use tokio::time::Instant;
 
-use super::session::{ClientSession, Opened};
+use super::admission::{ClientSession, Opened};
 use super::transport::{ClientStream, Transport};
 use crate::actors::gateway::registry::{HeldPlace, Request};
 use crate::actors::resources::places::{HeldSlot, Refused};

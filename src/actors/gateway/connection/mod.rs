@@ -14,7 +14,6 @@ mod detection;
 #[cfg(feature = "web")]
 mod http;
 mod reader;
-mod session;
 #[cfg_attr(
     not(feature = "web"),
     allow(dead_code, reason = "only an HTTP request opens a WebSocket")
@@ -29,11 +28,10 @@ use std::task::{self, Poll};
 use actix::fut::wrap_future;
 use actix::prelude::*;
 
-use self::admission::Admission;
+use self::admission::{Admission, ClientSession, Opened};
 
 pub use self::client::Connection;
 use self::reader::ClientReader;
-use self::session::{ClientSession, Opened};
 pub use self::transport::ClientStream;
 use self::writer::ClientWriter;
 use super::registry::{Outlets, Registry};
