@@ -1,7 +1,7 @@
 //! The actor: reads the clock, advances the simulation, wakes for the next tick.
 //!
-//! The arm wakes 60 times a second, or 10 times while nothing observes it. It advances to the present time before it handles a message, so every answer has
-//! the present state. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond that
+//! The arm wakes 60 times a second, or 10 times while nothing observes it. It advances to the present time before it
+//! handles a message, so every answer has the present state. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond that
 //! are taken after [`STEP_PAUSE`]. Waiting messages do not delay the wake-up, because it is checked at the end of every
 //! [turn](super::turn).
 //!
@@ -110,7 +110,8 @@ impl<const N: usize> ArmSim<N> {
     }
 
     /// Wakes at the next multiple of the tick's length, or at a later one while nothing observes the arm. Missed ticks
-    /// are skipped, not made up.
+    /// are skipped, not made up. tokio sorts a wait of more than 64 ms in two stages, so an arm at rest has two wake-ups for
+    /// each tick.
     fn schedule_tick(&mut self, ctx: &mut Context<Self>) {
         let count = match self.commander {
             Some(_) => 1,
