@@ -236,8 +236,9 @@ fn compare_object(
     field: &Field,
     value: Option<&Json>,
 ) {
-    let values = value
-        .and_then(|value| members(types::members(field), value).or_else(|| model.refuse(field.name)));
+    let values = value.and_then(|value| {
+        members(types::members(field), value).or_else(|| model.refuse(field.name))
+    });
     let is_object = values.is_some();
     let mut inner = Model {
         values: values.unwrap_or_default(),

@@ -130,7 +130,7 @@ impl Stage {
         let (ours, theirs) = duplex(room);
         let (admission, local) = (Arc::clone(&self.admission), SocketAddr::from(LOCAL));
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
-        connection::start_with(None, admission, local, theirs, registry, gauges);
+        connection::start(None, admission, local, theirs, registry, gauges);
         ours
     }
 

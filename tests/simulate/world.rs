@@ -90,7 +90,7 @@ impl World {
         };
         let local = SocketAddr::from(LOCAL);
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
-        connection::start_with(None, Arc::default(), local, pipe, registry, gauges);
+        connection::start(None, Arc::default(), local, pipe, registry, gauges);
         (ours, fate)
     }
 

@@ -56,7 +56,7 @@ impl Gateway {
         let (ours, theirs) = duplex(room);
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
         let local = SocketAddr::from(([127, 0, 0, 1], 9095));
-        connection::start_with(None, admission, local, theirs, registry, gauges);
+        connection::start(None, admission, local, theirs, registry, gauges);
         ours
     }
 

@@ -40,7 +40,7 @@ pub async fn accept(
                 let local = stream.local_addr().unwrap_or(Ends::default().local);
                 let (admission, ends) = (Arc::clone(&admission), Ends { local, peer });
                 let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
-                connection::start_with(None, admission, ends, stream, registry, gauges);
+                connection::start(None, admission, ends, stream, registry, gauges);
             }
             Err(error) => {
                 if !std::mem::replace(&mut failing, true) {

@@ -6,22 +6,18 @@
 //! **Invariant:** an invalid field never prevents a valid one from taking effect.
 
 mod controller;
-mod messages;
 mod parameters;
 mod simulation;
-mod step;
 
 pub use self::controller::{
     Enable, PeriodInForce, SensorsInForce, SetGains, SetLimits, SetPeriod, SetSensors,
 };
-pub use self::messages::{joint_names, read_effort};
 pub use self::parameters::{
     AskParameters, NamedParameter, NotSet, ParameterChange, ParameterRequest, ParameterValue,
     parameter_services,
 };
 pub(crate) use self::simulation::DIVERGED;
 pub use self::simulation::{
-    Disturb, GetTime, Integrator, Pause, Push, Reset, SetFriction, SetIntegrator, SetParams,
-    SetState,
+    Disturb, GetTime, Integrator, MAX_STEPS, Pause, Push, Reset, STEPS_IN_A_ROW, SetFriction,
+    SetIntegrator, SetParams, SetState, Step, Stepped, StepsEnd, joint_names, read_effort,
 };
-pub use self::step::{MAX_STEPS, STEPS_IN_A_ROW, Step, Stepped, StepsEnd};

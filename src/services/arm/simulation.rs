@@ -1,4 +1,8 @@
-//! `/arm_sim/*`: the arm's parameters, method and timestep, state and time, and disturbances.
+//! `/arm_sim/*`: the arm's parameters, method and timestep, state and time, disturbances, and single steps of a paused arm.
+//! Also efforts on `/effort_controller/commands`.
+//!
+//! Steps are taken [`STEPS_IN_A_ROW`] at a time, and requests for more take turns. The effect is that of separate
+//! requests, so other requests take effect in between.
 //!
 //! **Invariant:** values that are not given do not change. Setting the present values does not change the arm, not even the
 //! fraction of a step. The arm is replaced as a whole, or not at all.
@@ -8,15 +12,31 @@ use serde_json::json;
 
 use crate::math::arm::{Arm, ArmError, State};
 use crate::math::integrator::Method;
-use crate::protocol::catalog::Service;
-use crate::protocol::messages::Stamp;
+use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::messages::{Empty, Stamp};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::protocol::wire::json::Payload;
 use crate::services::{Address, Ask, Echo};
 
 /// The reason for a refusal after a divergence.
 pub(crate) const DIVERGED: &str =
     "is refused: the simulation has diverged; /arm_sim/reset clears this";
+
+/// Most steps in one request: the budget of one wake-up, and ten seconds at the default timestep.
+pub const MAX_STEPS: u64 = 10_000;
+
+/// Steps per turn: about 0.2 ms of work, so neither the tick nor another client's call waits long.
+pub const STEPS_IN_A_ROW: u64 = 1000;
+
+/// Names of the joints, base first.
+const JOINT_NAMES: [&str; 3] = ["joint1", "joint2", "joint3"];
+
+/// The names of an arm's joints, base first.
+#[must_use]
+pub fn joint_names<const N: usize>() -> [&'static str; N] {
+    std::array::from_fn(|i| JOINT_NAMES.get(i).copied().unwrap_or_default())
+}
 
 request! {
     /// Sets the arm's parameters.
@@ -150,6 +170,73 @@ pub struct Push<const N: usize> {
     pub effort: [f64; N],
     /// Simulation time \[s\].
     pub duration: f64,
+}
+
+request! {
+    /// Takes steps while paused. Refused if a field was rejected, or if the arm cannot be stepped.
+    pub struct Step<N> -> Result<Stepped<N>, Rejections>, |fields| {
+        /// The number of steps, 1 to [`MAX_STEPS`].
+        steps: Option<u64> = fields.count("steps", 1..=MAX_STEPS),
+        /// The effort in these steps \[N m\], in place of the controller's; `None` for the controller's.
+        effort: Option<[f64; N]> = fields.array("effort", Bound::Finite),
+    }
+
+    fn write(answer: Result<Stepped<N>, Rejections>, to: &Address) -> Bytes {
+        match answer {
+            Ok(stepped) => {
+                let status = match stepped.end {
+                    StepsEnd::AllTaken => "",
+                    StepsEnd::Diverged => "steps ended early: the simulation has diverged",
+                    StepsEnd::Resumed => "steps ended early: the arm has been resumed",
+                };
+                let values = object! {
+                    steps: stepped.steps,
+                    time: stepped.time,
+                    position: stepped.state.position.as_slice(),
+                    velocity: stepped.state.velocity.as_slice(),
+                    effort: stepped.effort.as_slice(),
+                };
+                to.response(&values, status)
+            }
+            Err(rejected) => to.response(&Empty {}, &rejected.status()),
+        }
+    }
+}
+
+/// The taken steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stepped<const N: usize> {
+    /// The number of steps.
+    pub steps: u64,
+    /// Simulation time after them \[s\].
+    pub time: f64,
+    /// Positions and velocities after them.
+    pub state: State<N>,
+    /// Effort of the last step \[N m\].
+    pub effort: [f64; N],
+    /// Why they ended.
+    pub end: StepsEnd,
+}
+
+/// Why the steps of a request ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StepsEnd {
+    /// All steps were taken.
+    AllTaken,
+    /// The simulation has diverged.
+    Diverged,
+    /// The arm has been resumed.
+    Resumed,
+}
+
+/// Reads the efforts \[N m\] of a `std_msgs/msg/Float64MultiArray`. Its layout is ignored.
+///
+/// # Errors
+/// If the message does not hold one for each joint.
+pub fn read_effort<const N: usize>(msg: &Payload) -> Result<[f64; N], Rejections> {
+    let mut fields = Fields::of_message(msg, Topic::EffortCommands)?;
+    let effort = fields.array("data", Bound::Finite);
+    effort.ok_or_else(|| fields.finish())
 }
 
 /// Asks for the simulation time \[s\].

@@ -7,25 +7,48 @@ use bytes::Bytes;
 use super::{Beside, Changed, Computed, Present, Refused, StudyWork};
 use crate::math::arm::ArmError;
 use crate::math::pid::Gains;
-use crate::protocol::catalog::Service;
-use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::{Address, Ask};
+use crate::services::Address;
 use crate::study::control_loop::no_control;
 use crate::study::gains::{GainsError, GainsRequirements, SuggestedGains, search_gains};
-use crate::study::planner::{PlanError, Planned, Task, plan, plan_beside};
+use crate::study::planner::{PlanError, Planned, Task, plan_beside};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
-/// Searches gains with which every move settles in time, with a stability margin.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SuggestGains<const N: usize> {
-    /// Time in which every move must settle \[s\], greater than 0.
-    pub settling_time: Option<f64>,
-    /// The required ratio of the smallest timestep limit over all poses to the timestep, at least 1.
-    pub margin: Option<f64>,
-    /// Changes of the present loop.
-    pub changed: Changed<N>,
+request! {
+    whole
+    /// Searches gains with which every move settles in time, with a stability margin.
+    #[derive(Debug, Clone, PartialEq, Default)]
+    pub struct SuggestGains<N> -> Result<Suggested<N>, Refused<GainsError>>, |fields| {
+        /// Time in which every move must settle \[s\], greater than 0.
+        settling_time: Option<f64> = fields.number("settling_time", Bound::Positive),
+        /// The required ratio of the smallest timestep limit over all poses to the timestep, at least 1.
+        margin: Option<f64> = read_margin(&mut fields),
+        /// Changes of the present loop.
+        changed: Changed<N> = Changed::read(&mut fields),
+    }
+
+    fn write(answer: Self::Answer, to: &Address) -> Bytes {
+        to.outcome(answer.as_ref().map(|Suggested { found, timestep }| {
+            object! {
+                kp: found.gains.kp.as_slice(),
+                ki: found.gains.ki.as_slice(),
+                kd: found.gains.kd.as_slice(),
+                timestep_limit: found.limit,
+                certified: found.certified,
+                margin: found.limit.map(|limit| limit / timestep),
+                settled_after: found.settled_after,
+            }
+        }))
+    }
+}
+
+fn read_margin(fields: &mut Fields<'_>) -> Option<f64> {
+    let margin = fields.number("margin", Bound::Finite)?;
+    if margin < 1.0 {
+        fields.refuse("margin", &format_args!("must be at least 1, got {margin}"));
+    }
+    Some(margin)
 }
 
 /// Simulated gains.
@@ -85,39 +108,6 @@ pub struct PlannedRun {
     pub control_period: Option<f64>,
 }
 
-// ---- reading and writing --------------------------------------------------------------------------------------------
-
-impl<const N: usize> Ask for SuggestGains<N> {
-    type Answer = Result<Suggested<N>, Refused<GainsError>>;
-
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read(arguments, service)?;
-        let ask = Self {
-            settling_time: fields.number("settling_time", Bound::Positive),
-            margin: fields.number("margin", Bound::Finite),
-            changed: Changed::read(&mut fields),
-        };
-        if let Some(margin) = ask.margin.filter(|margin| *margin < 1.0) {
-            fields.refuse("margin", &format_args!("must be at least 1, got {margin}"));
-        }
-        fields.accept(ask)
-    }
-
-    fn write(answer: Self::Answer, to: &Address) -> Bytes {
-        to.outcome(answer.as_ref().map(|Suggested { found, timestep }| {
-            object! {
-                kp: found.gains.kp.as_slice(),
-                ki: found.gains.ki.as_slice(),
-                kd: found.gains.kd.as_slice(),
-                timestep_limit: found.limit,
-                certified: found.certified,
-                margin: found.limit.map(|limit| limit / timestep),
-                settled_after: found.settled_after,
-            }
-        }))
-    }
-}
-
 // ---- work -----------------------------------------------------------------------------------------------------------
 
 /// Default settling time \[s\]: the default gains meet it on the default arms.
@@ -151,20 +141,6 @@ impl<const N: usize> Computed<N> for SuggestGains<N> {
 
 // ---- plan -----------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Computed<N> for PlanRun<N> {
-    type Work = StudyWork<Self::Answer>;
-
-    fn work(self, present: Present<N>) -> Self::Work {
-        StudyWork::new::<N>(async move {
-            let task = task(&self, &present)?;
-            Ok(planned_run(
-                &task,
-                plan(task).await.map_err(Refused::Study)?,
-            ))
-        })
-    }
-}
-
 impl<const N: usize> Computed<N> for Beside<PlanRun<N>> {
     type Work = StudyWork<Self::Answer>;
 
@@ -172,18 +148,13 @@ impl<const N: usize> Computed<N> for Beside<PlanRun<N>> {
         StudyWork::new::<N>(async move {
             let task = task(&self.ask, &present)?;
             let planned = plan_beside(task, self.own).await.map_err(Refused::Study)?;
-            Ok(planned_run(&task, planned))
+            let (period, timestep) = (task.control.period.period, planned.best.timestep);
+            let period = if period > 0.0 { period } else { timestep };
+            Ok(PlannedRun {
+                planned,
+                control_period: (!task.control.is_free()).then_some(period),
+            })
         })
-    }
-}
-
-fn planned_run<const N: usize>(task: &Task<N>, planned: Planned) -> PlannedRun {
-    let period = task.control.period.period;
-    let timestep = planned.best.timestep;
-    let period = if period > 0.0 { period } else { timestep };
-    PlannedRun {
-        planned,
-        control_period: (!task.control.is_free()).then_some(period),
     }
 }
 

@@ -21,7 +21,7 @@ async fn lateness(queue_length: u64, a_second: u32, chunk: usize) -> (Duration, 
     theirs.on_write = Box::new(move |bytes| count.set(count.get() + bytes.len()));
     let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
     let (source, asked) = (Rc::clone(&unread), Rc::clone(&queries));
-    connection::start_with(
+    connection::start(
         Some(Box::new(move || {
             asked.set(asked.get() + 1);
             Some(source.get())

@@ -41,19 +41,9 @@ use crate::actors::resources::unread;
 pub use crate::actors::resources::unread::Ends;
 use crate::protocol::outbox::flow::UnreadSource;
 
-/// Starts the actor for `stream` in the current system. It requires no token.
-pub fn start_on<S: ClientStream>(
-    stream: S,
-    registry: Addr<Registry>,
-    gauges: Arc<Gauges>,
-) -> Addr<Connection<S>> {
-    let (admission, ends) = (Arc::default(), Ends::default());
-    start_with(None, admission, ends, stream, registry, gauges)
-}
-
-/// Starts the actor for a client that must be admitted. If `unread` is given, it returns the client's unread bytes.
+/// Starts the actor for `stream` in the current system. If `unread` is given, it returns the client's unread bytes.
 /// Otherwise the system does.
-pub fn start_with<S: ClientStream>(
+pub fn start<S: ClientStream>(
     unread: Option<UnreadSource>,
     admission: Arc<Admission>,
     ends: impl Into<Ends>,
