@@ -1,9 +1,9 @@
 //! The actor: reads the clock, advances the simulation, wakes for the next tick.
 //!
 //! The arm wakes 60 times a second, or 10 times while nothing observes it. It advances to the present time before it
-//! handles a message, so every answer has the present state. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond that
-//! are taken after [`STEP_PAUSE`]. Waiting messages do not delay the wake-up, because it is checked at the end of every
-//! [turn](super::turn).
+//! handles a message, so every answer has the present state. Work per wake-up is bounded by
+//! [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond that are taken after [`STEP_PAUSE`]. Waiting messages do
+//! not delay the wake-up, because it is checked at the end of every [turn](super::turn).
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit. An
 //! answer that the arm is at rest follows all news of goals.

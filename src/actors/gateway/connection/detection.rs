@@ -1,6 +1,7 @@
 //! Detects the protocol of a client. Its first bytes decide whether it is refused, served over HTTP, or exchanges frames.
 //!
-//! **Invariant:** no input is parsed as JSON before the protocol is detected.
+//! **Invariant:** no input is parsed as JSON before the protocol is detected. The bytes read for the detection are not
+//! lost.
 
 use std::time::Duration;
 
