@@ -114,8 +114,8 @@ serve() { # name, frames to send first, subscribers of /joint_states
         rm -f "$counts"*
         return
     fi
-    put "$name-encoded" "$(awk "BEGIN { print $(calls_of 'messages::frames::publish$' "$counts".1) / $seconds }")" "messages per second"
-    put "$name-json" "$(awk "BEGIN { printf \"%.0f\", $(of_functions 'serde_json|zmij|messages::frames' "$counts".1) / $seconds }")" "instructions per second"
+    put "$name-encoded" "$(awk "BEGIN { print $(calls_of 'protocol::messages::publish$' "$counts".1) / $seconds }")" "messages per second"
+    put "$name-json" "$(awk "BEGIN { printf \"%.0f\", $(of_functions 'serde_json|zmij|protocol::messages::(publish|respelled|message_text)' "$counts".1) / $seconds }")" "instructions per second"
     rm -f "$counts"*
     put "$name" "$(awk "BEGIN { printf \"%.0f\", ${total:-0} / $seconds }")" "instructions per second"
 }

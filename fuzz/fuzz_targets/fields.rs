@@ -9,7 +9,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use pendularm::protocol::catalog::{Field, Service};
+use pendularm::protocol::catalog::{Field, Service, types};
 use pendularm::protocol::op::fields::{Bound, Fields};
 use pendularm::protocol::op::{self, Arguments, CallService, Op};
 use pendularm::protocol::wire::frame::FrameReader;
@@ -236,8 +236,9 @@ fn compare_object(
     field: &Field,
     value: Option<&Json>,
 ) {
-    let values = value
-        .and_then(|value| members(field.members(), value).or_else(|| model.refuse(field.name)));
+    let values = value.and_then(|value| {
+        members(types::members(field), value).or_else(|| model.refuse(field.name))
+    });
     let is_object = values.is_some();
     let mut inner = Model {
         values: values.unwrap_or_default(),
@@ -246,7 +247,7 @@ fn compare_object(
         refused: Vec::new(),
     };
     let read = fields.object(field.name, |members| {
-        for member in field.members() {
+        for member in types::members(field) {
             compare(members, &mut inner, member, 11);
         }
     });

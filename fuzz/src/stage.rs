@@ -14,8 +14,7 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::connection::admission::Admission;
+use pendularm::actors::gateway::connection::{self, admission::Admission};
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::{Caller, Interest, Nodes, Publish, Route, ServiceCall, TopicMessage};
 use pendularm::actors::resources::gauges::Gauges;
@@ -131,7 +130,7 @@ impl Stage {
         let (ours, theirs) = duplex(room);
         let (admission, local) = (Arc::clone(&self.admission), SocketAddr::from(LOCAL));
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
-        Connection::start_with(None, admission, local, theirs, registry, gauges);
+        connection::start(None, admission, local, theirs, registry, gauges);
         ours
     }
 

@@ -31,7 +31,7 @@ use crate::actors::resources::listening;
 use crate::actors::resources::long_work::THREADS;
 use crate::actors::resources::open_files::{Capacity, make_capacity};
 use crate::actors::resources::places::{MAX_NEWCOMERS, Slots};
-use crate::actors::resources::priority::lower_priority;
+use crate::actors::resources::priority::{lower_priority, name_thread};
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::start;
 #[cfg(feature = "web")]
@@ -93,6 +93,7 @@ pub fn run(options: &Options, force_exit: Box<dyn FnOnce() + Send>) -> Result<()
     let mut signals = Signals::listen(force_exit)?;
     let tokio = Builder::new_current_thread()
         .enable_all()
+        .thread_name("long-work")
         .on_thread_start(lower_priority)
         .max_blocking_threads(THREADS + FILES)
         .thread_keep_alive(FOR_EVER)
@@ -133,8 +134,10 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
         .start();
     let workers = WorkerPool::start(WorkerPool::default_threads())?;
     // The arm has no sockets, so its thread sleeps on a lock instead of a poll, and wakes faster.
-    let arm_thread =
-        Arbiter::try_with_tokio_rt(|| Builder::new_current_thread().enable_time().build())?;
+    let arm_thread = Arbiter::try_with_tokio_rt(|| {
+        name_thread(c"arm_sim");
+        Builder::new_current_thread().enable_time().build()
+    })?;
     let mut nodes = Nodes::default();
     let seed = options.seed.unwrap_or_else(|| fastrand::u64(..));
     let start = match options.links {

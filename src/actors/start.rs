@@ -9,14 +9,14 @@ use actix::prelude::*;
 use super::arm::follow::PathFollower;
 use super::arm::ik_action::{GoalTracker, IkAction};
 use super::arm::ik_trial::{GoalClient, IkTrial, TrialArm};
-use super::arm::sim::{ArmSim, AttachNodes};
+use super::arm::sim::{self, ArmSim, AttachNodes};
 use super::compute::study::Study;
 use super::compute::workers::WorkerPool;
 use super::gateway::registry::Registry;
 use super::node::{Nodes, ShutDown};
 use super::resources::gauges::Gauges;
 use super::ros::rosapi::RosapiNode;
-use super::ros::tf_web::TfRepublisher;
+use super::ros::tf_web::{self, TfRepublisher};
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
 use crate::options::Links;
@@ -61,11 +61,11 @@ pub fn start_nodes<const N: usize>(
     seed: u64,
     nodes: &mut Nodes,
 ) -> Vec<Recipient<ShutDown>> {
-    ArmSim::attach(arm, nodes);
+    sim::attach(arm, nodes);
     let rosapi = RosapiNode::new(registry.clone().recipient()).start();
     RosapiNode::attach(&rosapi, nodes);
     let frames = TfRepublisher::new(arm.clone().recipient(), registry.clone().recipient()).start();
-    TfRepublisher::attach(&frames, nodes);
+    tf_web::attach(&frames, nodes);
     let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
     Study::attach(&study, nodes);
     let follower = PathFollower::new(arm.clone().recipient(), arm.clone().recipient()).start();

@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use crate::math::arm::State;
 use crate::math::goal::{Cadence, Criteria, Goal, Outcome};
-use crate::math::kinematics::{Target, forward};
+use crate::math::kinematics::{Target, forward, nearest_turn};
 use crate::math::pid::Setpoint;
 use crate::math::simulation::Simulation;
 use crate::protocol::catalog::Service;
@@ -57,6 +57,22 @@ pub struct Pose<const N: usize> {
     pub obstacle: Option<Obstacle>,
 }
 
+impl<const N: usize> Pose<N> {
+    /// The state of a moving arm.
+    pub(super) fn of(simulation: &Simulation<N>, past: Past) -> Self {
+        Self {
+            lengths: *simulation.arm().lengths(),
+            state: *simulation.state(),
+            setpoint: *simulation.pid().setpoint(),
+            time: simulation.time(),
+            resets: past.resets,
+            simulated: past.time + simulation.time(),
+            stands_still: false,
+            obstacle: Obstacle::of(simulation),
+        }
+    }
+}
+
 /// A goal for the arm.
 #[derive(Debug, Clone, Copy)]
 pub struct GoalOrder {
@@ -94,18 +110,6 @@ pub struct GoalProgress<const N: usize> {
     pub outcome: Option<Outcome>,
 }
 
-/// The arm's record of goals.
-#[derive(Default)]
-pub(crate) struct Goals<const N: usize> {
-    pub(super) tracked: Option<Tracked>,
-    /// How the latest goal ended, for a query that was sent before its news arrived.
-    pub(super) latest: Option<GoalProgress<N>>,
-    /// A client has sent a setpoint while the controller was off, and the controller is still off.
-    pub(crate) setpoint_waits: bool,
-    /// The past before the last reset.
-    pub(crate) past: Past,
-}
-
 /// The past before the last reset.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Past {
@@ -121,20 +125,23 @@ impl Past {
     const LONGEST: f64 = 1e9;
 
     /// Records a reset, with the time since the previous one \[s\].
-    pub(super) fn end(&mut self, time: f64) {
+    fn end(&mut self, time: f64) {
         let time = self.time + time;
         self.time = if time < Self::LONGEST { time } else { 0.0 };
         self.resets += 1;
     }
 }
 
-/// A goal that has not ended.
-pub(super) struct Tracked {
-    pub(super) number: u64,
-    pub(super) goal: Goal,
-    pub(super) feedback: Cadence,
-    /// Its setpoint is held, and each step is checked.
-    pub(super) commanded: bool,
+/// The arm's record of goals.
+#[derive(Default)]
+pub(crate) struct Goals<const N: usize> {
+    tracked: Option<Tracked>,
+    /// How the latest goal ended, for a query that was sent before its news arrived.
+    latest: Option<GoalProgress<N>>,
+    /// A client has sent a setpoint while the controller was off, and the controller is still off.
+    pub(crate) setpoint_waits: bool,
+    /// The past before the last reset.
+    pub(super) past: Past,
 }
 
 impl<const N: usize> Goals<N> {
@@ -143,14 +150,98 @@ impl<const N: usize> Goals<N> {
         self.tracked.is_some()
     }
 
+    /// Whether a goal or a setpoint waits for the controller, which is off.
+    pub(super) fn are_held_up(&self, simulation: &Simulation<N>) -> bool {
+        let is_meant_to_move = self.is_tracked() || self.setpoint_waits;
+        is_meant_to_move && !simulation.pid().is_enabled()
+    }
+
+    /// Whether each step is checked.
+    pub(super) fn judge_steps(&self) -> bool {
+        self.tracked.as_ref().is_some_and(|goal| goal.commanded)
+    }
+
+    /// The goal against which each step is checked.
+    pub(super) fn commanded(&mut self) -> Option<&mut Tracked> {
+        self.tracked.as_mut().filter(|goal| goal.commanded)
+    }
+
+    /// Begins a goal with this solution, in place of the previous one.
+    pub(super) fn track(
+        &mut self,
+        order: &GoalOrder,
+        solution: &[f64; N],
+        simulation: &Simulation<N>,
+    ) -> Tracking<N> {
+        self.preempt(simulation);
+        self.tracked = Some(Tracked {
+            number: order.number,
+            goal: Goal::new(order.target.position, order.criteria, simulation.time()),
+            feedback: Cadence::default(),
+            commanded: false,
+        });
+        Tracking {
+            positions: nearest_turn(solution, &simulation.state().position),
+            before: self.latest,
+            obstacle: Obstacle::of(simulation),
+        }
+    }
+
+    /// The goal's setpoint is held from this time on \[s\], and each step is checked. Returns `false` if it has ended.
+    pub(super) fn command(&mut self, number: u64, time: f64) -> bool {
+        let tracked = self.tracked.as_mut();
+        let Some(tracked) = tracked.filter(|goal| goal.number == number) else {
+            return false;
+        };
+        let (target, criteria) = (tracked.goal.target(), tracked.goal.criteria());
+        tracked.goal = Goal::new(target, criteria, time);
+        tracked.commanded = true;
+        true
+    }
+
+    /// Preempts the goal, unless it has ended already. Returns how the latest goal ended.
+    pub(super) fn end(
+        &mut self,
+        number: u64,
+        simulation: &Simulation<N>,
+    ) -> Option<GoalProgress<N>> {
+        let tracked = self.tracked.as_ref();
+        if tracked.is_some_and(|goal| goal.number == number) {
+            self.preempt(simulation);
+        }
+        self.latest
+    }
+
+    /// The goal has been reached.
+    pub(super) fn end_reached(&mut self, progress: GoalProgress<N>) {
+        self.tracked = None;
+        self.latest = Some(progress);
+    }
+
+    /// Ends the goal, if there is one, before the simulation is reset.
+    pub(super) fn end_for_reset(&mut self, simulation: &Simulation<N>) -> Option<GoalProgress<N>> {
+        let ended = self.preempt(simulation);
+        self.past.end(simulation.time());
+        ended
+    }
+
     /// Ends the goal, if there is one, in the arm's present state.
-    pub(super) fn preempt(&mut self, simulation: &Simulation<N>) -> Option<GoalProgress<N>> {
+    fn preempt(&mut self, simulation: &Simulation<N>) -> Option<GoalProgress<N>> {
         let tracked = self.tracked.take()?;
         let mut progress = tracked.progress(simulation, self.past);
         progress.outcome = Some(Outcome::Preempted);
         self.latest = Some(progress);
         Some(progress)
     }
+}
+
+/// A goal that has not ended.
+pub(super) struct Tracked {
+    number: u64,
+    goal: Goal,
+    feedback: Cadence,
+    /// Its setpoint is held, and each step is checked.
+    commanded: bool,
 }
 
 impl Tracked {
@@ -179,7 +270,7 @@ impl Tracked {
             number: self.number,
             distance: self.goal.distance(end_effector(simulation)),
             elapsed: self.goal.elapsed(simulation.time()),
-            pose: pose(simulation, past),
+            pose: Pose::of(simulation, past),
             outcome: None,
         }
     }
@@ -188,18 +279,4 @@ impl Tracked {
 /// Position of the end effector \[m\], with the present lengths.
 fn end_effector<const N: usize>(simulation: &Simulation<N>) -> DVec2 {
     forward(simulation.arm().lengths(), &simulation.state().position).position
-}
-
-/// The state of a moving arm.
-pub(super) fn pose<const N: usize>(simulation: &Simulation<N>, past: Past) -> Pose<N> {
-    Pose {
-        lengths: *simulation.arm().lengths(),
-        state: *simulation.state(),
-        setpoint: *simulation.pid().setpoint(),
-        time: simulation.time(),
-        resets: past.resets,
-        simulated: past.time + simulation.time(),
-        stands_still: false,
-        obstacle: Obstacle::of(simulation),
-    }
 }

@@ -8,11 +8,8 @@
 
 use std::time::Duration;
 
-use super::limit_watch::{resemble, share_limit};
-use super::{LiveArm, World};
 use crate::math::shown::{Shown, shown_against};
-use crate::math::simulation::ControlPeriod;
-use crate::protocol::catalog::Topic;
+use crate::math::simulation::{ControlPeriod, Simulation};
 use crate::protocol::messages::ErrorEstimateMessage;
 use crate::study::clocks::ClockLimits;
 use crate::study::control_loop::ControlLoop;
@@ -33,104 +30,82 @@ enum Exceeded {
     Timestep,
 }
 
-impl<const N: usize, W: World<N>> LiveArm<N, W> {
-    /// At a tick: publishes at once if a warning appears or ends.
-    pub(super) fn watch_warnings(&mut self) {
-        if !self.wants_limit() {
-            return;
-        }
-        let is_known = !self.timestep_limit().is_nan();
+/// The last predicted limit.
+#[derive(Default)]
+pub(crate) struct LimitWatch<const N: usize> {
+    /// The loop of the last request, and its time.
+    asked: Option<(ControlLoop<N>, Duration)>,
+    /// Whether the answer is still pending.
+    waiting: bool,
+    /// The latest answer and its loop.
+    known: Option<(ControlLoop<N>, ClockLimits)>,
+    /// The last published warnings: whether a timestep or a period was too long, and whether a goal waited for
+    /// the controller.
+    warned: (bool, bool),
+}
+
+impl<const N: usize> LimitWatch<N> {
+    /// Returns whether a warning has appeared or ended since the last call.
+    pub(super) fn note_warnings(&mut self, simulation: &Simulation<N>, is_held_up: bool) -> bool {
+        let is_known = !self.limits(simulation).0.is_nan();
         let exceeded = if is_known {
-            self.exceeded().is_some()
+            self.exceeded(simulation).is_some()
         } else {
-            self.limit.warned.0
+            self.warned.0
         };
-        let warned = (exceeded, self.is_held_up());
-        if warned != self.limit.warned {
-            self.limit.warned = warned;
-            self.publish_diagnostics();
-        }
+        let warned = (exceeded, is_held_up);
+        std::mem::replace(&mut self.warned, warned) != warned
     }
 
-    /// Whether a goal or a setpoint waits for the controller, which is off.
-    pub(super) fn is_held_up(&self) -> bool {
-        let is_meant_to_move = self.goals.is_tracked() || self.goals.setpoint_waits;
-        is_meant_to_move && !self.simulation.pid().is_enabled()
-    }
-
-    /// The active loop, if its limit must be predicted. `None` if the limit is known, requested already, or not
-    /// shown. The caller passes the prediction to [`LiveArm::keep_limit`].
-    pub fn limit_to_predict(&mut self) -> Option<ControlLoop<N>> {
-        if self.limit.waiting || !self.wants_limit() {
+    /// The active loop, if its limit is neither known nor requested already.
+    pub(super) fn next_prediction(
+        &mut self,
+        simulation: &Simulation<N>,
+        now: Duration,
+    ) -> Option<ControlLoop<N>> {
+        if self.waiting {
             return None;
         }
-        let (present, now) = (ControlLoop::in_force(&self.simulation), self.world.now());
-        let settled = self.limit.asked.is_some_and(|(control, asked_at)| {
+        let present = ControlLoop::in_force(simulation);
+        let settled = self.asked.is_some_and(|(control, asked_at)| {
             let soon = now.saturating_sub(asked_at) < LEAST_PAUSE;
             share_limit(&control, &present) || (soon && resemble(&control, &present))
         });
         if settled {
             return None;
         }
-        self.limit.asked = Some((present, now));
-        self.limit.waiting = true;
+        self.asked = Some((present, now));
+        self.waiting = true;
         Some(present)
     }
 
     /// The prediction for a loop, if there is one.
-    pub fn keep_limit(&mut self, of: ControlLoop<N>, limits: Option<ClockLimits>) {
-        self.limit.waiting = false;
+    pub(super) fn keep(&mut self, of: ControlLoop<N>, limits: Option<ClockLimits>) {
+        self.waiting = false;
         if let Some(limits) = limits {
-            self.limit.known = Some((of, limits));
+            self.known = Some((of, limits));
         }
     }
 
-    fn wants_limit(&self) -> bool {
-        self.counts.wants(Topic::Diagnostics) || self.counts.wants(Topic::ErrorEstimate)
-    }
-
-    /// The latest predictions \[s\], of the timestep and of the control period: infinite if nothing limits, NaN
-    /// while there are none. Limits for an earlier setpoint are used until the next prediction. Limits for another
-    /// arm, other gains, another method or another period are not used.
-    fn limits(&self) -> (f64, f64) {
+    /// The largest stable timestep at the present control period and the largest stable control period, as predicted
+    /// \[s\]: infinite if nothing limits, NaN while there are none. Limits for an earlier setpoint are used until the
+    /// next prediction. Limits for another arm, other gains, another method or another period are not used.
+    pub(super) fn limits(&self, simulation: &Simulation<N>) -> (f64, f64) {
         let infinite = |limit: Option<f64>| limit.unwrap_or(f64::INFINITY);
-        match &self.limit.known {
-            Some((of, limits)) if resemble(of, &ControlLoop::in_force(&self.simulation)) => {
+        match &self.known {
+            Some((of, limits)) if resemble(of, &ControlLoop::in_force(simulation)) => {
                 (infinite(limits.timestep), infinite(limits.period))
             }
             _ => (f64::NAN, f64::NAN),
         }
     }
 
-    /// The largest stable timestep \[s\] at the present control period, as predicted.
-    pub(super) fn timestep_limit(&self) -> f64 {
-        self.limits().0
-    }
-
-    /// The largest stable control period \[s\], as predicted.
-    pub(super) fn period_limit(&self) -> f64 {
-        self.limits().1
-    }
-
-    /// The time between two runs of the law, in whole steps \[s\].
-    pub(super) fn effective_period(&self) -> f64 {
-        let period = self.simulation.control_period();
-        period.effective(self.simulation.timestep())
-    }
-
-    /// The coming motion of the arm, and its largest timestep.
-    pub(super) fn motion(&self) -> Motion {
-        let control = ControlLoop::in_force(&self.simulation);
-        Motion::ahead(&control, self.simulation.state())
-    }
-
     /// The exceeded limit. If both are exceeded it is the control period's, because no timestep corrects that.
-    fn exceeded(&self) -> Option<Exceeded> {
-        let simulation = &self.simulation;
-        let (timestep, (limit, period_limit)) = (simulation.timestep(), self.limits());
-        let effective = self.effective_period();
+    fn exceeded(&self, simulation: &Simulation<N>) -> Option<Exceeded> {
+        let (timestep, (limit, period_limit)) = (simulation.timestep(), self.limits(simulation));
+        let effective = effective_period(simulation);
         let is_sampled = simulation.pid().is_enabled() && effective > timestep;
-        let motion = self.motion();
+        let motion = motion(simulation);
         if is_sampled && effective > period_limit {
             Some(Exceeded::Period)
         } else if motion.timestep < timestep && (limit.is_nan() || motion.timestep < limit) {
@@ -141,21 +116,20 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     }
 
     /// The warning about the present timestep or control period, if one exceeds its limit.
-    pub(super) fn limit_warning(&self) -> Option<String> {
-        let simulation = &self.simulation;
-        let (timestep, (limit, period_limit)) = (simulation.timestep(), self.limits());
+    pub(super) fn warning(&self, simulation: &Simulation<N>) -> Option<String> {
+        let (timestep, (limit, period_limit)) = (simulation.timestep(), self.limits(simulation));
         let method = simulation.method();
         let condition = if simulation.pid().is_enabled() {
             "at the present setpoint"
         } else {
             "with the controller off"
         };
-        let effective = self.effective_period();
+        let effective = effective_period(simulation);
         let over = |value: f64, limit: f64| {
             let (value, limit) = (shown_against(value, limit), shown_against(limit, value));
             format!("{value} s exceeds {limit} s")
         };
-        Some(match self.exceeded()? {
+        Some(match self.exceeded(simulation)? {
             Exceeded::Period => format!(
                 "the control period {}, the predicted stability limit of the controller {condition}",
                 over(effective, period_limit)
@@ -184,16 +158,43 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     }
 
     /// The message of `/arm_sim/error_estimate`, for the next step, paused or not.
-    pub(super) fn error_estimate(&self) -> ErrorEstimateMessage<'static> {
-        let estimate = estimate(&self.simulation);
-        self.world.count_estimate();
+    pub(super) fn error_estimate(
+        &self,
+        simulation: &Simulation<N>,
+    ) -> ErrorEstimateMessage<'static> {
+        let estimate = estimate(simulation);
         ErrorEstimateMessage {
-            method: self.simulation.method().name(),
-            timestep: self.simulation.timestep(),
+            method: simulation.method().name(),
+            timestep: simulation.timestep(),
             local_error: estimate.map_or(f64::NAN, |one| one.local_error),
             velocity_error: estimate.map_or(f64::NAN, |one| one.velocity_error),
             error_per_second: estimate.map_or(f64::NAN, |one| one.error_per_second),
-            predicted_limit: self.timestep_limit(),
+            predicted_limit: self.limits(simulation).0,
         }
     }
+}
+
+/// The time between two runs of the law, in whole steps \[s\].
+pub(super) fn effective_period<const N: usize>(simulation: &Simulation<N>) -> f64 {
+    let period = simulation.control_period();
+    period.effective(simulation.timestep())
+}
+
+/// The coming motion of the arm, and its largest timestep.
+pub(super) fn motion<const N: usize>(simulation: &Simulation<N>) -> Motion {
+    let control = ControlLoop::in_force(simulation);
+    Motion::ahead(&control, simulation.state())
+}
+
+/// Whether two loops have the same limit. It depends on everything except the timestep.
+fn share_limit<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
+    one.setpoint == other.setpoint && resemble(one, other)
+}
+
+/// Whether two loops differ at most in setpoint and timestep.
+fn resemble<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
+    one.arm == other.arm
+        && one.gains == other.gains
+        && one.method == other.method
+        && one.period == other.period
 }

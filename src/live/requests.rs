@@ -7,9 +7,8 @@ use super::{LiveArm, World};
 use crate::math::arm::{Arm, State};
 use crate::math::kinematics::Unreachable;
 use crate::math::limits::Limits;
-use crate::math::pid::{Gains, Setpoint};
+use crate::math::pid::Gains;
 use crate::math::simulation::{ArmInput, ControlPeriod};
-use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::Rejections;
 use crate::services::arm::{
     DIVERGED, Disturb, Enable, GetTime, Integrator, Pause, PeriodInForce, Push, Reset,
@@ -18,31 +17,6 @@ use crate::services::arm::{
 };
 use crate::services::goals::Solve;
 use crate::services::{Ask, Echo};
-
-/// Why an effort is not applied.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the controller is on; {} with data false switches it off", Service::Enable.name())]
-pub struct ControllerOn;
-
-impl<const N: usize, W: World<N>> LiveArm<N, W> {
-    /// A client's setpoint is held from the next step on.
-    pub fn hold(&mut self, setpoint: Setpoint<N>) {
-        self.change(ArmInput::Setpoint(setpoint));
-        self.goals.setpoint_waits = !self.simulation.pid().is_enabled();
-    }
-
-    /// A client's effort \[N m\] is applied from the next step on.
-    ///
-    /// # Errors
-    /// While the controller is on.
-    pub fn command(&mut self, effort: [f64; N]) -> Result<(), ControllerOn> {
-        if self.simulation.pid().is_enabled() {
-            return Err(ControllerOn);
-        }
-        self.change(ArmInput::Command(effort));
-        Ok(())
-    }
-}
 
 /// A request that the arm answers at once.
 pub trait ArmRequest<const N: usize>: Ask {

@@ -1,36 +1,35 @@
-//! Single steps of a paused arm, taken in rows (a limited number per turn).
+//! Requested steps of a paused arm.
 //!
-//! **Invariant:** a row ends with each message about a goal, so the message is sent before the next
-//! step.
+//! **Invariant:** a request is refused as a whole, before its first step.
 
-use super::{GoalProgress, LiveArm, World};
-use crate::math::simulation::ArmInput;
+use crate::math::simulation::Simulation;
 use crate::protocol::op::fields::Rejections;
-use crate::services::arm::{DIVERGED, STEPS_IN_A_ROW, Step, Stepped, StepsEnd};
+use crate::services::arm::{DIVERGED, Step, Stepped, StepsEnd};
 
 /// Requested steps that are not all taken.
 #[derive(Debug, Clone, Copy)]
 pub struct StepsAsked<const N: usize> {
-    asked: u64,
-    taken: u64,
+    pub(super) asked: u64,
+    pub(super) taken: u64,
     /// The effort that is applied instead of the controller's \[N m\], if there is one.
-    effort: Option<[f64; N]>,
+    pub(super) effort: Option<[f64; N]>,
 }
 
-impl<const N: usize, W: World<N>> LiveArm<N, W> {
-    /// Checks whether the steps can be taken.
-    ///
-    /// # Errors
-    /// All rejected fields of the request.
-    pub fn begin_steps(&self, ask: Step<N>) -> Result<StepsAsked<N>, Rejections> {
+impl<const N: usize> StepsAsked<N> {
+    /// Checks whether an arm in this state can be stepped.
+    pub(super) fn begin(
+        ask: Step<N>,
+        is_paused: bool,
+        has_diverged: bool,
+    ) -> Result<Self, Rejections> {
         let mut rejected = ask.rejected;
-        if !self.paused {
+        if !is_paused {
             rejected.refuse("steps", &"can be taken only while the arm is paused");
-        } else if self.simulation.divergence().is_some() {
+        } else if has_diverged {
             rejected.refuse("steps", &DIVERGED);
         }
         match ask.steps.filter(|_| rejected.is_empty()) {
-            Some(asked) => Ok(StepsAsked {
+            Some(asked) => Ok(Self {
                 asked,
                 taken: 0,
                 effort: ask.effort,
@@ -39,48 +38,13 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// Takes the next row of steps. Returns the answer after the last one, and the message about the goal to be
-    /// sent before the next row.
-    pub fn take_row(
-        &mut self,
-        steps: &mut StepsAsked<N>,
-    ) -> (Option<Stepped<N>>, Option<GoalProgress<N>>) {
-        if !self.paused {
-            return (Some(self.stepped(steps, StepsEnd::Resumed)), None);
-        }
-        let has_diverged = self.simulation.divergence().is_some();
-        if steps.effort.is_some() {
-            self.change(ArmInput::Drive(steps.effort));
-        }
-        let row_end = steps.asked.min(steps.taken + STEPS_IN_A_ROW);
-        let mut progress = None;
-        // A reached goal ends an advance, but not the request. News of a goal end the row.
-        while steps.taken < row_end && progress.is_none() && self.simulation.divergence().is_none()
-        {
-            let taken;
-            (taken, progress) = self.advance(row_end - steps.taken, true);
-            steps.taken += taken;
-        }
-        if steps.effort.is_some() {
-            self.change(ArmInput::Drive(None));
-        }
-        let end = if self.simulation.divergence().is_some() {
-            if !has_diverged {
-                self.note_divergence();
-            }
-            Some(StepsEnd::Diverged)
-        } else {
-            (steps.taken == steps.asked).then_some(StepsEnd::AllTaken)
-        };
-        (end.map(|end| self.stepped(steps, end)), progress)
-    }
-
-    fn stepped(&self, steps: &StepsAsked<N>, end: StepsEnd) -> Stepped<N> {
+    /// The answer after the last step.
+    pub(super) fn answer(&self, simulation: &Simulation<N>, end: StepsEnd) -> Stepped<N> {
         Stepped {
-            steps: steps.taken,
-            time: self.simulation.time(),
-            state: *self.simulation.state(),
-            effort: *self.simulation.effort(),
+            steps: self.taken,
+            time: simulation.time(),
+            state: *simulation.state(),
+            effort: *simulation.effort(),
             end,
         }
     }

@@ -110,20 +110,13 @@ impl<const N: usize> Ask for GoalRequest<N> {
     }
 }
 
-/// Preempts a goal if it is the active one. Answered after its result has been published.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct CancelRequest {
-    /// The id of the goal; `None` for the active one.
-    pub goal_id: Option<String>,
-}
-
-impl Ask for CancelRequest {
-    type Answer = Result<(), CancelRejected>;
-
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read(arguments, service)?;
-        let goal_id = fields.text("goal_id").map(std::borrow::Cow::into_owned);
-        fields.accept(Self { goal_id })
+request! {
+    whole
+    /// Preempts a goal if it is the active one. Answered after its result has been published.
+    #[derive(Debug, Clone, PartialEq, Eq)]
+    pub struct CancelRequest -> Result<(), CancelRejected>, |fields| {
+        /// The id of the goal; `None` for the active one.
+        goal_id: Option<String> = fields.text("goal_id").map(std::borrow::Cow::into_owned),
     }
 
     fn write(answer: Result<(), CancelRejected>, to: &Address) -> Bytes {

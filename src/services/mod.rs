@@ -20,19 +20,30 @@ macro_rules! object {
     }};
 }
 
-/// A request: its answer, its fields with the expression that reads each, and the writer of the answer. The fields of a
+/// The writer of an answer: a function, or the members that an [`Echo`] shows of its values.
+macro_rules! writer {
+    (|$values:ident| { $($members:tt)* }) => {
+        fn write(echo: Self::Answer, to: &$crate::services::Address) -> bytes::Bytes {
+            let $values = &echo.values;
+            to.response(&object! { $($members)* }, &echo.rejected.status())
+        }
+    };
+    ($($write:tt)*) => { $($write)* };
+}
+
+/// A request: its answer, its fields with the expression that reads each, and the [`writer`] of the answer. The fields of a
 /// `whole` request are all valid, or it is rejected. Of the others each field is checked alone: an invalid one never
 /// prevents a valid one from taking effect, and the request has the rejections.
 macro_rules! request {
-    (whole $(#[$about:meta])* pub struct $request:ident<$n:ident> -> $answer:ty, |$fields:ident| {
+    (whole $(#[$about:meta])* pub struct $request:ident$(<$n:ident>)? -> $answer:ty, |$fields:ident| {
         $($(#[$doc:meta])* $field:ident: $kind:ty = $read:expr,)*
     } $($write:tt)*) => {
         $(#[$about])*
-        pub struct $request<const $n: usize> {
+        pub struct $request$(<const $n: usize>)? {
             $($(#[$doc])* pub $field: $kind,)*
         }
 
-        impl<const $n: usize> $crate::services::Ask for $request<$n> {
+        impl$(<const $n: usize>)? $crate::services::Ask for $request$(<$n>)? {
             type Answer = $answer;
 
             fn read(
@@ -80,7 +91,7 @@ macro_rules! request {
                 Ok(Self::from_fields(&mut Fields::read_or_none(arguments, service)))
             }
 
-            $($write)*
+            writer! { $($write)* }
         }
     };
 }

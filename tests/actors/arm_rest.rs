@@ -14,7 +14,8 @@ use crate::system::{counting_wake_ups, in_virtual_time};
 use crate::virtual_time::stand_in;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
-    ArmSim, EndGoal, GoalOrder, GoalProgress, SetListener, TakeSnapshot, TrackGoal,
+    ArmSim, EndGoal, GoalOrder, GoalProgress, PUBLISH_RATE, REST_TICKS, SetListener, TakeSnapshot,
+    TrackGoal,
 };
 use pendularm::actors::node::{Interest, Publish};
 use pendularm::math::arm::Arm;
@@ -22,9 +23,10 @@ use pendularm::math::goal::Criteria;
 use pendularm::math::kinematics::Target;
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::Topic;
-use tokio::time::{Instant, sleep};
+use tokio::task::JoinHandle;
+use tokio::time::{Instant, sleep, sleep_until};
 
-/// Wake-ups of a second are fewer. Virtual time itself wakes the thread some times for each wait of 100 ms.
+/// Wake-ups of a second are fewer. Each wait of 100 ms has some wake-ups of the timer's own.
 const AT_REST: u64 = 55;
 
 /// The topics and times of published messages.
@@ -89,6 +91,31 @@ fn an_arm_that_nothing_observes_wakes_ten_times_a_second() {
         arm.send(SetListener(None)).await.unwrap();
         assert!(in_a_second().await < AT_REST);
     });
+}
+
+/// The timer of tokio sorts waits into slots of 64 ms, and at the slot into slots of 1 ms. So each wait of 100 ms wakes the
+/// thread once more. The arm itself adds no wake-up to those of a timer with its period.
+#[test]
+fn an_arm_at_rest_wakes_as_often_as_a_bare_timer_of_its_period() {
+    let in_ten_seconds = |has_arm: bool| {
+        counting_wake_ups(|sleeps| async move {
+            let period = REST_TICKS * (1_000_000_000 / u64::from(PUBLISH_RATE));
+            let timer = async move {
+                let began = Instant::now();
+                for count in 1.. {
+                    sleep_until(began + Duration::from_nanos(count * period)).await;
+                }
+            };
+            let _arm = has_arm.then(arm);
+            let timer = (!has_arm).then(|| actix_rt::spawn(timer));
+            sleep(ms(10_050)).await;
+            timer.inspect(JoinHandle::abort);
+            sleeps.load(Ordering::Relaxed)
+        })
+    };
+    let (arm, timer) = (in_ten_seconds(true), in_ten_seconds(false));
+    assert_eq!(arm, timer);
+    assert!(timer > 2 * 100, "{timer}");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use crate::system::in_real_time;
 use crate::virtual_time::{Gateway, WIDE, route, settle};
-use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::connection::{self, Ends};
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::node::ServiceCall;
 use pendularm::protocol::catalog::Service;
@@ -27,7 +27,10 @@ async fn subscriber(gateway: &Gateway, listener: &TcpListener, topic: &str) -> T
     let (stream, _) = listener.accept().unwrap();
     stream.set_nonblocking(true).unwrap();
     let stream = tokio::net::TcpStream::from_std(stream).unwrap();
-    Connection::start_on(
+    connection::start(
+        None,
+        Arc::default(),
+        Ends::default(),
         stream,
         gateway.registry.clone(),
         Arc::clone(&gateway.gauges),

@@ -10,7 +10,7 @@ use std::time::Duration;
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, Watched, route, settle};
 use bytes::Bytes;
-use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::connection::{self, Ends};
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::node::Publish;
 use pendularm::actors::panics::{self, contain};
@@ -56,7 +56,14 @@ fn a_panic_in_a_reader_or_writer_ends_that_client_alone() {
             } else {
                 trap.on_write = Box::new(|_| panic!("in writing"));
             }
-            Connection::start_on(trap, gateway.registry.clone(), Arc::clone(&gateway.gauges));
+            connection::start(
+                None,
+                Arc::default(),
+                Ends::default(),
+                trap,
+                gateway.registry.clone(),
+                Arc::clone(&gateway.gauges),
+            );
             let frames = json!({"op": "advertise_service", "service": "/s"});
             ours.write_all(format!("{frames}\n").as_bytes())
                 .await

@@ -34,7 +34,7 @@ fn parts_of_a_question_have_the_members_that_their_services_have_as_fields() {
                 "tableau" => continue,
                 _ => &[],
             };
-            assert_eq!(field.members(), members, "{field:?}");
+            assert_eq!(types::members(field), members, "{field:?}");
         }
     }
 }

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use pendularm::actors::compute::workers::{Computation, Progress, WorkerPool};
-use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::connection;
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::memory::Memory;
@@ -90,7 +90,7 @@ impl World {
         };
         let local = SocketAddr::from(LOCAL);
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
-        Connection::start_with(None, Arc::default(), local, pipe, registry, gauges);
+        connection::start(None, Arc::default(), local, pipe, registry, gauges);
         (ours, fate)
     }
 

@@ -13,8 +13,7 @@ use std::task::{self, Poll};
 use std::time::Duration;
 
 use actix::prelude::*;
-use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::connection::admission::Admission;
+use pendularm::actors::gateway::connection::{self, admission::Admission};
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::{Nodes, Route};
 use pendularm::actors::resources::gauges::Gauges;
@@ -57,7 +56,7 @@ impl Gateway {
         let (ours, theirs) = duplex(room);
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
         let local = SocketAddr::from(([127, 0, 0, 1], 9095));
-        Connection::start_with(None, admission, local, theirs, registry, gauges);
+        connection::start(None, admission, local, theirs, registry, gauges);
         ours
     }
 

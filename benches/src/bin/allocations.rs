@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use actix::prelude::*;
 use bytes::Bytes;
-use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::connection::{self, Ends};
 use pendularm::actors::gateway::registry::Registry;
 use pendularm::actors::node::Publish;
 use pendularm::actors::resources::gauges::Gauges;
@@ -73,7 +73,14 @@ async fn per_message(subscribers: usize, messages: u32, size: usize) -> f64 {
     let mut clients = Vec::new();
     for _ in 0..subscribers {
         let (near, mut far) = tokio::io::duplex(1 << 20);
-        Connection::start_on(near, registry.clone(), Arc::clone(&gauges));
+        connection::start(
+            None,
+            Arc::default(),
+            Ends::default(),
+            near,
+            registry.clone(),
+            Arc::clone(&gauges),
+        );
         far.write_all(b"{\"op\":\"subscribe\",\"topic\":\"/joint_states\"}\n")
             .await
             .expect("sent");

@@ -87,7 +87,7 @@ impl LongFrames {
             Ok(Some(whole)) => whole,
             Ok(None) => return Ok(None),
             Err((why, start)) => {
-                return Ok(Some((Incoming::of_start(&start, &why).under_id(id), 0)));
+                return Ok(Some((op::read_start(&start, &why).under_id(id), 0)));
             }
         };
         let length = whole.bytes();

@@ -3,7 +3,6 @@
 //!
 //! **Invariant:** nothing here blocks an actor's thread for longer than a slice.
 
-mod answering;
 pub mod computations;
 pub mod long_frames;
 pub mod study;

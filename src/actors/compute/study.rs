@@ -4,21 +4,22 @@
 //! A missing value is requested from the arm when the computation begins. The arm itself does not change. A connection
 //! submits one computation at a time.
 //!
-//! **Invariant:** a call is answered once, and blocks neither the arm nor another client.
+//! **Invariant:** a call is answered once, and blocks neither the arm nor another client. It waits for memory for its answer,
+//! and stops when its caller disconnects.
 
 use std::time::Duration;
 
 use actix::prelude::*;
 use tokio::sync::oneshot;
 
-use super::answering::answer;
-use super::workers::WorkerPool;
+use super::workers::{Computation, Progress, WorkerPool};
 use crate::actors::arm::sim::{ArmSettings, HeldLimit};
 use crate::actors::node::{Call, Nodes, Reply, Unserved};
+use crate::actors::resources::work_clock;
 use crate::protocol::catalog::Service;
 pub use crate::services::study::{
-    AnalyseMethod, Beside, FindHeldLimit, IntegrationStep, PlanRun, PlannedRun, PredictStability,
-    Predicted, Ran, Refused, RunOffline, SuggestGains, Suggested,
+    AnalyseMethod, Beside, Changed, FindHeldLimit, IntegrationStep, PlanRun, PlannedRun,
+    PredictStability, Predicted, Ran, Refused, RunOffline, SuggestGains, Suggested,
 };
 use crate::services::study::{Computed, Integrating, Work};
 use crate::study::clocks::{ClockLimits, clock_limits};
@@ -117,5 +118,44 @@ impl<const N: usize> Work<ClockLimits> for Limiting<N> {
 
     fn advance(&mut self, _: fn() -> Duration) -> Option<ClockLimits> {
         Some(clock_limits(&self.0))
+    }
+}
+
+/// Passes a call to the workers, once there is memory for its answer.
+async fn answer<T: Send + 'static>(
+    workers: WorkerPool,
+    mut reply: Reply<T>,
+    work: impl Work<T> + 'static,
+) {
+    if reply.reserve(work.most_bytes()).await {
+        workers.submit(Box::new(Answering { reply, work }));
+    }
+}
+
+struct Answering<T, W> {
+    reply: Reply<T>,
+    work: W,
+}
+
+impl<T: Send, W: Work<T>> Computation for Answering<T, W> {
+    fn advance(&mut self, deadline: Duration) -> Progress {
+        loop {
+            if self.reply.caller_is_gone() {
+                self.reply.refuse(Unserved::CALLER_GONE);
+                return Progress::Finished;
+            }
+            if let Some(answer) = self.work.advance(work_clock::now) {
+                // Megabytes take a worker some tenths of a second, in which it does nothing else.
+                self.reply.answer(answer);
+                return Progress::Finished;
+            }
+            if work_clock::now() >= deadline {
+                return Progress::Unfinished;
+            }
+        }
+    }
+
+    fn refuse(&mut self, why: &'static str) {
+        self.reply.refuse(Unserved(why));
     }
 }

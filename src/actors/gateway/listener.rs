@@ -10,7 +10,7 @@ use actix::prelude::*;
 use tokio::net::TcpListener;
 
 use super::connection::admission::Admission;
-use super::connection::{Connection, Ends};
+use super::connection::{self, Ends};
 use super::registry::Registry;
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::listening::prepare;
@@ -40,7 +40,7 @@ pub async fn accept(
                 let local = stream.local_addr().unwrap_or(Ends::default().local);
                 let (admission, ends) = (Arc::clone(&admission), Ends { local, peer });
                 let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
-                Connection::start_with(None, admission, ends, stream, registry, gauges);
+                connection::start(None, admission, ends, stream, registry, gauges);
             }
             Err(error) => {
                 if !std::mem::replace(&mut failing, true) {

@@ -2,7 +2,6 @@
 //!
 //! **Invariant:** there is one record at a time. Without one, arm and registry send no events.
 
-mod clock;
 pub mod limits;
 pub mod listeners;
 mod requests;
@@ -14,10 +13,9 @@ use std::path::{Path, PathBuf};
 use actix::prelude::*;
 use tokio::sync::oneshot;
 
-use self::clock::TapeClock;
 use self::limits::MAX_RECORD_BYTES;
 pub use self::requests::{NotRecorded, RecordTo, Recorded, StartRecording, StopRecording};
-use self::tape::{Begun, TapeTarget};
+use self::tape::{Begun, TapeClock, TapeTarget};
 use crate::actors::arm::sim::SetListener;
 use crate::actors::node::SetTap;
 use crate::actors::node::{Call, Nodes};

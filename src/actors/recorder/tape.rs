@@ -1,7 +1,8 @@
 //! The path of entries to the file: a bounded queue, and the thread that writes.
 //!
 //! **Invariant:** no sender waits for the file. A message that does not fit into the queue is dropped, counted
-//! and reported. Topics leave half of the queue to inputs.
+//! and reported. Topics leave half of the queue to inputs. The time of day is read once and continued with a monotonic
+//! clock, and no decision depends on it.
 
 use std::fs::{self, File};
 use std::io;
@@ -10,17 +11,40 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
-use std::time::Instant;
+use std::time::{Duration, Instant, SystemTime};
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
-use super::clock::TapeClock;
 use super::limits::{FLUSH_PERIOD, MAX_RECORDS, MAX_WAITING_BYTES, MAX_WAITING_ENTRIES};
 use super::requests::{NotRecorded, Recorded};
 use crate::record::{Content, McapWriter, RecordEntry, RecordError, RunSettings};
 
 /// The extension of a record's file name.
 const EXTENSION: &str = "mcap";
+
+/// A clock of the time of day that never runs backwards.
+#[derive(Clone, Copy)]
+pub(super) struct TapeClock {
+    began: Instant,
+    since_1970: Duration,
+}
+
+impl TapeClock {
+    /// A clock that starts at the present time of day.
+    pub(super) fn start() -> Self {
+        let since_1970 = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
+        Self {
+            began: Instant::now(),
+            since_1970,
+        }
+    }
+
+    /// Nanoseconds since 1970.
+    pub(super) fn now(&self) -> u64 {
+        let now = self.since_1970 + self.began.elapsed();
+        u64::try_from(now.as_nanos()).unwrap_or(u64::MAX)
+    }
+}
 
 /// Destination of a record.
 pub(super) struct TapeTarget {

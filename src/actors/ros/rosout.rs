@@ -105,7 +105,7 @@ struct LogMessage {
     line: u32,
 }
 
-/// The actor of the reporting module: `registry` for `pendularm::actors::gateway::registry::calls`.
+/// The actor of the reporting module: `registry` for `pendularm::actors::gateway::registry::clients`.
 fn node_of(target: &'static str) -> &'static str {
     let modules = target.split("::").skip_while(|part| *part != "actors");
     let modules: Vec<&'static str> = modules.skip(1).take(2).collect();
@@ -126,7 +126,10 @@ mod tests {
         for (target, node) in [
             ("pendularm::actors::arm::sim::node", "arm_sim"),
             ("pendularm::actors::arm::ik_action", "ik_action"),
-            ("pendularm::actors::gateway::registry::calls", "registry"),
+            (
+                "pendularm::actors::gateway::registry::forwarding",
+                "registry",
+            ),
             ("pendularm::actors::gateway::connection", "connection"),
             ("pendularm::actors::compute::workers", "workers"),
             ("pendularm::actors::runtime", "runtime"),

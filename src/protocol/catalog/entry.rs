@@ -215,7 +215,7 @@ pub(super) const fn service(
         request: &[],
         response: &[],
         is_computation: false,
-        null_is_absent: false,
+        null_is_absent: true,
         supersedes: &[],
     }
 }
@@ -239,10 +239,10 @@ impl ServiceEntry {
         }
     }
 
-    /// `null` in an optional field means absent.
-    pub(super) const fn null_is_absent(self) -> Self {
+    /// `null` in an optional field does not mean absent. A field may accept it.
+    pub(super) const fn null_is_refused(self) -> Self {
         Self {
-            null_is_absent: true,
+            null_is_absent: false,
             ..self
         }
     }

@@ -129,7 +129,7 @@ table! {
 }
 
 const fn question(name: &'static str, type_name: &'static str) -> ServiceEntry {
-    service(name, type_name, Node::Rosapi).null_is_absent()
+    service(name, type_name, Node::Rosapi)
 }
 
 const TYPEDEFS: &[Field] = fields!["rosapi_msgs/msg/TypeDef[] typedefs"];

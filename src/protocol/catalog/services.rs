@@ -28,8 +28,7 @@ table! {
                 "float64[] positions  # m",
                 "float64[] velocities  # m/s",
             ])
-            .computation()
-            .null_is_absent(),
+            .computation(),
         /// Method and timestep of the live arm.
         SetIntegrator = changes("/arm_sim/set_integrator", "pendularm_interfaces/srv/SetIntegrator")
             .request(METHOD)
@@ -46,6 +45,7 @@ table! {
         Pause = of_arm("/arm_sim/pause", "pendularm_interfaces/srv/Pause")
             .request(SWITCH)
             .response(SWITCH)
+            .null_is_refused()
             .supersedes(ARM_STATE_AND_FEEDBACK),
         /// Returns to the starting pose at time 0.
         Reset = of_arm("/arm_sim/reset", "pendularm_interfaces/srv/Reset")
@@ -72,28 +72,23 @@ table! {
         /// The names of the arm's parameters.
         ListParameters = of_arm("/arm_sim/list_parameters", "rcl_interfaces/srv/ListParameters")
             .request(fields!["string[] prefixes?", "uint64 depth?"])
-            .response(fields!["rcl_interfaces/msg/ListParametersResult result"])
-            .null_is_absent(),
+            .response(fields!["rcl_interfaces/msg/ListParametersResult result"]),
         /// Their values.
         GetParameters = of_arm("/arm_sim/get_parameters", "rcl_interfaces/srv/GetParameters")
             .request(NAMES)
-            .response(fields!["rcl_interfaces/msg/ParameterValue[] values"])
-            .null_is_absent(),
+            .response(fields!["rcl_interfaces/msg/ParameterValue[] values"]),
         /// Their types.
         GetParameterTypes = of_arm("/arm_sim/get_parameter_types", "rcl_interfaces/srv/GetParameterTypes")
             .request(NAMES)
-            .response(fields!["uint8[] types"])
-            .null_is_absent(),
+            .response(fields!["uint8[] types"]),
         /// Their descriptions.
         DescribeParameters = of_arm("/arm_sim/describe_parameters", "rcl_interfaces/srv/DescribeParameters")
             .request(NAMES)
-            .response(fields!["rcl_interfaces/msg/ParameterDescriptor[] descriptors"])
-            .null_is_absent(),
+            .response(fields!["rcl_interfaces/msg/ParameterDescriptor[] descriptors"]),
         /// Sets them.
         SetParameters = changes("/arm_sim/set_parameters", "rcl_interfaces/srv/SetParameters")
             .request(fields!["rcl_interfaces/msg/Parameter[] parameters"])
-            .response(fields!["rcl_interfaces/msg/SetParametersResult[] results"])
-            .null_is_absent(),
+            .response(fields!["rcl_interfaces/msg/SetParametersResult[] results"]),
         /// The controller on or off.
         Enable = changes("/pid_controller/enable", "pendularm_interfaces/srv/Enable")
             .request(SWITCH)
@@ -117,8 +112,7 @@ table! {
         /// Joint positions for an end effector position.
         Solve = service("/ik/solve", "pendularm_interfaces/srv/Solve", Node::Ik)
             .request(fields!["float64 x  # m", "float64 y  # m", "float64 phi?  # rad"])
-            .response(fields!["float64[] positions  # rad"])
-            .null_is_absent(),
+            .response(fields!["float64[] positions  # rad"]),
         /// Drives the arm to an end effector position.
         SendGoal = service("/ik_action/send_goal", "pendularm_interfaces/srv/SendGoal", Node::IkAction)
             .request(fields![
@@ -128,17 +122,14 @@ table! {
                 "float64 epsilon?  # m",
                 "float64 success_hold?  # s",
             ])
-            .response(fields!["string goal_id"])
-            .null_is_absent(),
+            .response(fields!["string goal_id"]),
         /// Preempts the active goal.
         CancelGoal = service("/ik_action/cancel_goal", "pendularm_interfaces/srv/CancelGoal", Node::IkAction)
-            .request(fields!["string goal_id?"])
-            .null_is_absent(),
+            .request(fields!["string goal_id?"]),
         /// Starts a new timed trial.
         TrialStart = service("/ik_trial/start", "pendularm_interfaces/srv/TrialStart", Node::IkTrial)
             .request(TRIAL)
-            .response(TRIAL)
-            .null_is_absent(),
+            .response(TRIAL),
         /// Replaces the trial's present target by a new one.
         TrialSkip = service("/ik_trial/skip", "pendularm_interfaces/srv/TrialSkip", Node::IkTrial),
         /// Ends the trial.
@@ -153,8 +144,7 @@ table! {
                 "float32 rate?  # Hz",
                 "builtin_interfaces/msg/Duration timeout?  # s, ns",
             ])
-            .response(fields!["string topic_name"])
-            .null_is_absent(),
+            .response(fields!["string topic_name"]),
         /// Predicts the largest stable timestep.
         Stability = service("/study/stability", "pendularm_interfaces/srv/Stability", Node::Study)
             .request(fields![
@@ -189,8 +179,7 @@ table! {
                 "float64 advised_timestep  # s",
                 "float64 advised_duration  # s",
             ])
-            .computation()
-            .null_is_absent(),
+            .computation(),
         /// Predicts the largest stable control period of any robot.
         HeldLimit = service("/study/held_limit", "pendularm_interfaces/srv/HeldLimit", Node::Study)
             .request(fields![
@@ -216,8 +205,7 @@ table! {
                 "float64 armature  # kg m^2",
                 "string explanation",
             ])
-            .computation()
-            .null_is_absent(),
+            .computation(),
         /// Analyses a method by its tableau.
         Method = service("/study/method", "pendularm_interfaces/srv/Method", Node::Study)
             .request(fields![
@@ -246,8 +234,7 @@ table! {
                 "string[] methods",
                 "uint64[] swing_evaluations_of_methods",
             ])
-            .computation()
-            .null_is_absent(),
+            .computation(),
         /// Runs the arm offline.
         Rollout = service("/study/rollout", "pendularm_interfaces/srv/Rollout", Node::Study)
             .request(fields![
@@ -284,8 +271,7 @@ table! {
                 "float64 sampling_error_uncertainty  # rad",
                 "pendularm_interfaces/msg/Divergence divergence  # s",
             ])
-            .computation()
-            .null_is_absent(),
+            .computation(),
         /// Finds gains that are stable in every pose and settle in time.
         SuggestGains = service("/study/gains", "pendularm_interfaces/srv/SuggestGains", Node::Study)
             .request(fields![
@@ -308,8 +294,7 @@ table! {
                 "float64 margin  # 1",
                 "float64 settled_after  # s",
             ])
-            .computation()
-            .null_is_absent(),
+            .computation(),
         /// Finds the cheapest method and timestep for an allowed error at the end effector.
         Plan = service("/study/plan", "pendularm_interfaces/srv/Plan", Node::Study)
             .request(fields![
@@ -343,14 +328,12 @@ table! {
                 "float64[] errors  # m",
                 "pendularm_interfaces/msg/OwnPlan own",
             ])
-            .computation()
-            .null_is_absent(),
+            .computation(),
         /// Begins a record.
         RecorderStart if "record" =
             service("/recorder/start", "pendularm_interfaces/srv/RecorderStart", Node::Recorder)
             .request(fields!["string name?"])
-            .response(fields!["string file"])
-            .null_is_absent(),
+            .response(fields!["string file"]),
         /// Ends the record.
         RecorderStop if "record" =
             service("/recorder/stop", "pendularm_interfaces/srv/RecorderStop", Node::Recorder)
@@ -367,7 +350,8 @@ const fn of_arm(name: &'static str, type_name: &'static str) -> ServiceEntry {
 
 /// A service that changes the arm, after which earlier states are outdated.
 const fn changes(name: &'static str, type_name: &'static str) -> ServiceEntry {
-    of_arm(name, type_name).supersedes(ARM_STATE)
+    let changes = of_arm(name, type_name).supersedes(ARM_STATE);
+    changes.null_is_refused()
 }
 
 const METHOD: &[Field] = fields!["string method?", "float64 timestep?  # s",];

@@ -23,21 +23,9 @@ table! {
             "float64[] data  # N m",
         ]),
         /// The arm's state, 60 Hz.
-        JointStates = published("/joint_states", Node::ArmSim, "sensor_msgs/msg/JointState", fields![
-            "std_msgs/msg/Header header",
-            "string[] name",
-            "float64[] position  # rad",
-            "float64[] velocity  # rad/s",
-            "float64[] effort  # N m",
-        ]),
+        JointStates = published("/joint_states", Node::ArmSim, "sensor_msgs/msg/JointState", JOINT_STATE),
         /// What the controller measures, 60 Hz.
-        MeasuredStates = published("/joint_states_measured", Node::ArmSim, "sensor_msgs/msg/JointState", fields![
-            "std_msgs/msg/Header header",
-            "string[] name",
-            "float64[] position  # rad",
-            "float64[] velocity  # rad/s",
-            "float64[] effort  # N m",
-        ]),
+        MeasuredStates = published("/joint_states_measured", Node::ArmSim, "sensor_msgs/msg/JointState", JOINT_STATE),
         /// Simulation time, 60 Hz.
         Clock = published("/clock", Node::ArmSim, "rosgraph_msgs/msg/Clock", fields![
             "builtin_interfaces/msg/Time clock  # s, ns",
@@ -133,6 +121,14 @@ table! {
     }
 }
 
+/// A state of all joints.
+const JOINT_STATE: &[Field] = fields![
+    "std_msgs/msg/Header header",
+    "string[] name",
+    "float64[] position  # rad",
+    "float64[] velocity  # rad/s",
+    "float64[] effort  # N m",
+];
 /// A goal's name in ROS 1.
 const GOAL_ID: &[Field] = fields!["builtin_interfaces/msg/Time stamp  # s, ns", "string id?",];
 

@@ -45,13 +45,11 @@ pub fn find(name: &str) -> Option<Type> {
         .filter(|one| names::same_type(one.name, name))
 }
 
-impl Field {
-    /// The members of an object field of a request, a message or a response, in documented order; empty for every other
-    /// field.
-    #[must_use]
-    pub fn members(&self) -> &'static [Self] {
-        find(self.kind).map_or(&[], |one| one.fields)
-    }
+/// The members of an object field of a request, a message or a response, in documented order; empty for every other
+/// field.
+#[must_use]
+pub fn members(field: &Field) -> &'static [Field] {
+    find(field.kind).map_or(&[], |one| one.fields)
 }
 
 /// `first` and every type inside it, each once, in the order of first use.

@@ -8,19 +8,19 @@
 
 mod control;
 pub mod fields;
+mod members;
+mod parse;
 mod problems;
 mod providers;
-mod rejections;
 #[cfg(feature = "runtime")]
 pub mod token;
 mod types;
 
 use std::time::Duration;
 
-use serde_json::value::RawValue;
-
+pub use self::members::OPS;
+pub use self::parse::{read, read_raw, read_start};
 pub use self::problems::{OpError, Problem};
-use self::types::duration;
 pub use self::types::{
     ActionGoal, Compression, Encoding, GoalStatus, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT,
     ProviderOp, Served, Subscribe, Verbosity,
@@ -28,10 +28,8 @@ pub use self::types::{
 use super::messages::ErrorForm;
 pub use crate::protocol::limits::MAX_NAME;
 use crate::protocol::wire::fragments::Piece;
-use crate::protocol::wire::frame::RawFrame;
-use crate::protocol::wire::json::{self, Payload};
+use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::series::Series;
-use crate::protocol::wire::text;
 
 /// A parsed frame.
 #[derive(Debug)]
@@ -40,6 +38,23 @@ pub struct Incoming {
     pub id: Option<Payload>,
     /// The operation.
     pub op: Result<Op, OpError>,
+}
+
+impl Incoming {
+    /// Gives an error the id of the pieces of its frame. An op, such as a bad answer, keeps its own id.
+    #[must_use]
+    pub fn under_id(self, id: Option<Payload>) -> Self {
+        match self.op {
+            Err(_) => Self { id, ..self },
+            Ok(_) => self,
+        }
+    }
+
+    /// Whether it is from a command of this program.
+    #[must_use]
+    pub const fn is_command(&self) -> bool {
+        matches!(self.op, Ok(Op::Auth { is_command, .. }) if is_command)
+    }
 }
 
 /// An operation.
@@ -132,223 +147,4 @@ pub struct CallService {
     pub args: Arguments,
     /// The timeout for a provider that is a client, if given; at most [`MAX_TIMEOUT`].
     pub timeout: Option<Duration>,
-}
-
-// ---- reading --------------------------------------------------------------------------------------------------------
-
-/// The members of a frame that the runtime reads.
-const KEYS: [&str; 25] = [
-    "op",
-    "id",
-    "topic",
-    "type",
-    "msg",
-    "throttle_rate",
-    "queue_length",
-    "service",
-    "args",
-    "timeout",
-    "values",
-    "result",
-    "status",
-    "level",
-    "errors",
-    "token",
-    "command",
-    "compression",
-    "fragment_size",
-    "data",
-    "num",
-    "total",
-    "action",
-    "action_type",
-    "feedback",
-];
-
-/// The known operations, by their names on the wire.
-pub const OPS: [&str; 18] = [
-    "advertise",
-    "unadvertise",
-    "publish",
-    "subscribe",
-    "unsubscribe",
-    "advertise_service",
-    "unadvertise_service",
-    "call_service",
-    "service_response",
-    "set_level",
-    "auth",
-    "fragment",
-    "send_action_goal",
-    "cancel_action_goal",
-    "advertise_action",
-    "unadvertise_action",
-    "action_feedback",
-    "action_result",
-];
-
-/// The value that a name must have.
-const A_NAME: &str = "a non-empty string";
-
-/// Decodes a frame, and reads its op or its error. `None` for a message that has only white space.
-#[must_use]
-pub fn read_raw(frame: RawFrame) -> Option<Incoming> {
-    Some(match frame.decode()? {
-        Ok(text) => read(&text),
-        Err((error, start)) => Incoming::of_start(&start, &error),
-    })
-}
-
-/// Reads a frame. Unknown members are ignored. Of a repeated member the last one counts.
-#[must_use]
-pub fn read(frame: &str) -> Incoming {
-    let (mut members, read) = Members::of(frame);
-    if let Err(error) = read {
-        return members.refused(Problem::not_json(&error));
-    }
-    let id = members.get("id").map(Payload::from);
-    let op = match members.known_op() {
-        Ok(op) => {
-            members.op = op;
-            members.operation()
-        }
-        Err(problem) => Err(OpError::Status(problem)),
-    };
-    Incoming { id, op }
-}
-
-/// The members of one frame.
-struct Members<'a> {
-    /// The operation, which the errors name. It is empty until it is known.
-    op: &'static str,
-    values: [Option<&'a RawValue>; KEYS.len()],
-}
-
-impl<'a> Members<'a> {
-    /// The members of `frame`. If it is not valid JSON, the members before the fault, and the fault.
-    fn of(frame: &'a str) -> (Self, Result<(), serde_json::Error>) {
-        let mut values = [None; KEYS.len()];
-        let read = json::members_into(frame, &KEYS, &mut values);
-        (Self { op: "", values }, read)
-    }
-
-    /// The member of that name, which must be one of [`KEYS`].
-    fn get(&self, field: &'static str) -> Option<&'a RawValue> {
-        let index = KEYS.iter().position(|key| *key == field)?;
-        self.values.get(index).copied().flatten()
-    }
-
-    /// The value of a field that is present and not `null`.
-    fn given(&self, field: &'static str) -> Option<&'a RawValue> {
-        self.get(field).filter(|raw| raw.get() != "null")
-    }
-
-    /// Its operation, one of [`OPS`].
-    fn known_op(&self) -> Result<&'static str, Problem> {
-        let raw = self.get("op").ok_or(Problem::NoOp)?;
-        let op = json::text(raw).ok_or_else(|| Problem::OpNotText(text::found(raw)))?;
-        OPS.into_iter()
-            .find(|known| *known == op)
-            .ok_or_else(|| Problem::UnknownOp(text::excerpt(&op)))
-    }
-
-    /// An optional member, read by `read`. If `read` returns `None`, the value is not the `expected` one.
-    fn optional<T>(
-        &self,
-        field: &'static str,
-        expected: &'static str,
-        read: impl FnOnce(&'a RawValue) -> Option<T>,
-    ) -> Result<Option<T>, Problem> {
-        let Some(raw) = self.get(field) else {
-            return Ok(None);
-        };
-        let mistyped = || Problem::Mistyped {
-            op: self.op,
-            field,
-            expected,
-            found: text::found(raw),
-        };
-        read(raw).map(Some).ok_or_else(mistyped)
-    }
-
-    /// The same for a required member.
-    fn typed<T>(
-        &self,
-        field: &'static str,
-        expected: &'static str,
-        read: impl FnOnce(&'a RawValue) -> Option<T>,
-    ) -> Result<T, Problem> {
-        let value = self.optional(field, expected, read)?;
-        value.ok_or(Problem::Missing { op: self.op, field })
-    }
-
-    /// A topic or service name.
-    fn name(&self, field: &'static str) -> Result<String, Problem> {
-        let name = self.typed(field, A_NAME, |raw| {
-            json::text(raw).filter(|name| !name.is_empty())
-        })?;
-        self.short(field, &name)?;
-        Ok(name.into_owned())
-    }
-
-    /// Refuses a text that is longer than a name may be.
-    fn short(&self, field: &'static str, text: &str) -> Result<(), Problem> {
-        let limit = MAX_NAME;
-        if text.len() <= limit {
-            return Ok(());
-        }
-        Err(Problem::TooLong {
-            op: self.op,
-            field,
-            limit,
-            length: text.len(),
-        })
-    }
-
-    /// A ROS message, which is an object.
-    fn object(&self, field: &'static str) -> Result<Payload, Problem> {
-        let object = self.typed(field, "an object", |raw| {
-            raw.get().starts_with('{').then_some(raw)
-        })?;
-        Ok(object.into())
-    }
-
-    fn call(&self) -> Result<CallService, Problem> {
-        Ok(CallService {
-            service: self.name("service")?,
-            timeout: self.timeout()?,
-            args: self.args(),
-        })
-    }
-
-    fn args(&self) -> Arguments {
-        let args = self.get("args").filter(|args| args.get() != "null");
-        args.map_or_else(Payload::empty_object, Payload::from)
-    }
-
-    /// As in rosbridge, 0 or less means no timeout, which here is the longest one.
-    fn timeout(&self) -> Result<Option<Duration>, Problem> {
-        let timeout = self.optional("timeout", "a finite number of seconds", |raw| {
-            json::number(raw).filter(|timeout| timeout.is_finite())
-        })?;
-        Ok(timeout.map(|timeout| match timeout {
-            0.0 => MAX_TIMEOUT,
-            _ => duration(timeout, MAX_TIMEOUT),
-        }))
-    }
-
-    fn operation(&self) -> Result<Op, OpError> {
-        let (kind, read) = match self.op {
-            "publish" => {
-                return Ok(Op::Publish {
-                    topic: self.name("topic")?,
-                    msg: self.object("msg")?,
-                });
-            }
-            "call_service" => (Served::Service, self.call().map(Op::CallService)),
-            "send_action_goal" => (Served::Action, self.goal().map(Op::SendActionGoal)),
-            _ => return self.or_bad_answer(self.other()),
-        };
-        read.map_err(|problem| self.fault(kind, problem))
-    }
 }

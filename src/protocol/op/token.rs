@@ -55,14 +55,6 @@ impl fmt::Debug for Token {
     }
 }
 
-impl Incoming {
-    /// Whether it is from a command of this program.
-    #[must_use]
-    pub const fn is_command(&self) -> bool {
-        matches!(self.op, Ok(Op::Auth { is_command, .. }) if is_command)
-    }
-}
-
 /// Why a client that must send a token is not admitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum AuthError {

@@ -32,10 +32,10 @@ pub fn encode(one: Type, msg: &Value) -> Vec<u8> {
 /// also if a string is not valid text.
 #[must_use]
 pub fn encode_within(one: Type, msg: &RawValue, most: usize) -> Option<Vec<u8>> {
-    let mut sink = Sink::new(most);
-    sink.extend(&HEADER);
-    sink.message(one, Some(msg));
-    sink.finish()
+    let mut writer = CdrWriter(Sink::new(most));
+    writer.0.extend(&HEADER);
+    writer.message(one, Some(msg));
+    writer.0.finish()
 }
 
 /// The type of that name, if it is a message. Such a name begins with a package.
@@ -49,7 +49,10 @@ fn whole<T: FromStr + Default>(value: Option<&RawValue>) -> T {
     number.unwrap_or_default()
 }
 
-impl Sink {
+/// Writes a message.
+struct CdrWriter(Sink);
+
+impl CdrWriter {
     fn message(&mut self, one: Type, msg: Option<&RawValue>) {
         let members = msg.and_then(|msg| members(one, msg)).unwrap_or_default();
         let members = members.into_iter().map(|[own, ros1]| own.or(ros1));
@@ -83,7 +86,7 @@ impl Sink {
         reason = "a float32 is the nearest one"
     )]
     fn single(&mut self, kind: &str, inner: Option<Type>, value: Option<&RawValue>) {
-        if self.is_over() {
+        if self.0.is_over() {
             return;
         }
         let float = || value.map_or(0.0, |value| json::number(value).unwrap_or(f64::NAN));
@@ -102,7 +105,7 @@ impl Sink {
                 None => self.string(""),
                 Some(value) => match json::text(value) {
                     Some(text) => self.string(&text),
-                    None => self.fail(),
+                    None => self.0.fail(),
                 },
             },
             other => match inner {
@@ -115,8 +118,8 @@ impl Sink {
 
     /// Writes a primitive at a multiple of its size.
     fn aligned<const SIZE: usize>(&mut self, bytes: [u8; SIZE]) {
-        self.align(HEADER.len(), SIZE);
-        self.extend(&bytes);
+        self.0.align(HEADER.len(), SIZE);
+        self.0.extend(&bytes);
     }
 
     fn count(&mut self, count: usize) {
@@ -126,8 +129,8 @@ impl Sink {
     /// The length including the final NUL, the text, the NUL.
     fn string(&mut self, text: &str) {
         self.count(text.len() + 1);
-        self.extend(text.as_bytes());
-        self.push(0);
+        self.0.extend(text.as_bytes());
+        self.0.push(0);
     }
 }
 

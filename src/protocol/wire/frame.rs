@@ -1,12 +1,14 @@
 //! Splits bytes into frames. The result does not depend on how the stream is divided into chunks.
 //!
-//! A frame is one JSON object. It ends where its braces and brackets balance outside strings. `malformed.rs` reports
-//! and skips anything else. Messages that need no parsing (see [`series`]) are taken unchanged.
+//! A frame is one JSON object. It ends where its braces and brackets balance outside strings. Anything else is reported
+//! and skipped: an object with a fault to its end, or to the newline if its brackets do not match, and a line to the
+//! newline. Messages that need no parsing (see [`series`]) are taken unchanged.
 //!
-//! **Invariant:** no byte is read more than three times. At most one incomplete frame and the last chunk are kept.
+//! **Invariant:** no byte is read more than three times. At most one incomplete frame and the last chunk are kept. Each
+//! part that is not a frame is reported once: an object at its fault, a line after its first bytes.
 
 pub use super::fault::{FrameError, KEPT_START};
-use super::fault::{Refused, not_an_object, not_utf8, start_of};
+use super::fault::{MAX_PREFIX, Refused, not_an_object, not_utf8, start_of};
 use super::literals::accept_literals;
 pub use super::opening::{Foreign, Opening, is_host_line, opening};
 use super::series::{self, Series};
@@ -17,7 +19,7 @@ const KEPT_BUFFER: usize = 16 * 1024;
 
 /// The part of the stream that the reader is in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ScanState {
+enum ScanState {
     /// Between frames: white space.
     Between,
     /// In an object that is kept.
@@ -49,15 +51,15 @@ pub enum FramePart {
 pub struct FrameReader {
     buffer: Vec<u8>,
     /// Start of the present frame in the buffer. Bytes before it have been returned or skipped.
-    pub(super) start: usize,
+    start: usize,
     /// How far the buffer has been scanned.
-    pub(super) at: usize,
-    pub(super) state: ScanState,
+    at: usize,
+    state: ScanState,
     nesting: Nesting,
     /// Whether the end of the line after the last frame has not come.
     is_single: bool,
     /// Longest frame.
-    pub(super) limit: usize,
+    limit: usize,
 }
 
 impl Default for FrameReader {
@@ -150,12 +152,12 @@ impl FrameReader {
     }
 
     /// The bytes that have not been scanned.
-    pub(super) fn rest(&self) -> &[u8] {
+    fn rest(&self) -> &[u8] {
         self.buffer.get(self.at..).unwrap_or_default()
     }
 
     /// The scanned bytes of the present frame.
-    pub(super) fn scanned(&self) -> &[u8] {
+    fn scanned(&self) -> &[u8] {
         self.buffer.get(self.start..self.at).unwrap_or_default()
     }
 
@@ -195,7 +197,7 @@ impl FrameReader {
     }
 
     /// Continues the scan of an object, up to its end or a fault.
-    pub(super) fn scan(&mut self) -> Option<ObjectEnd> {
+    fn scan(&mut self) -> Option<ObjectEnd> {
         let rest = self.buffer.get(self.at..).unwrap_or_default();
         let (scanned, end) = self.nesting.scan(rest);
         self.at += scanned;
@@ -228,7 +230,7 @@ impl FrameReader {
     }
 
     /// The next frame, or a part that is not a frame. `None` means that more bytes are needed.
-    pub(super) fn next_raw(&mut self) -> Option<Result<RawFrame, Refused>> {
+    fn next_raw(&mut self) -> Option<Result<RawFrame, Refused>> {
         loop {
             let found = match self.state {
                 ScanState::Between => {
@@ -251,6 +253,90 @@ impl FrameReader {
             }
         }
     }
+
+    // ---- parts that are not frames ----------------------------------------------------------------------------------
+
+    /// Ends the stream, after the last frame was taken. An incomplete frame is one malformed frame.
+    pub fn finish(&mut self) -> Option<FrameError> {
+        let error = match self.state {
+            ScanState::Object => Some(FrameError::StreamEnded),
+            ScanState::Line => Some(not_an_object(self.scanned())),
+            _ => None,
+        };
+        *self = Self::with_limit(self.limit);
+        error
+    }
+
+    /// Reports an object that has a fault, or is too long.
+    fn refuse(&mut self, end: Option<ObjectEnd>, is_too_long: bool) -> Refused {
+        let kept = start_of(self.scanned());
+        self.state = state_after(end.as_ref());
+        self.start = self.at;
+        match end {
+            Some(Err(error)) if !is_too_long => (error, kept),
+            _ => (FrameError::TooLong(self.limit), kept),
+        }
+    }
+
+    /// Continues a part that is not a frame, or that was reported. `None` if there is nothing to report yet.
+    fn scan_malformed(&mut self) -> Option<Refused> {
+        if self.state == ScanState::SkippedObject {
+            let end = self.scan();
+            self.state = state_after(end.as_ref());
+            self.start = self.at;
+            return None;
+        }
+        let rest = self.rest();
+        let newline = rest.iter().position(|&byte| byte == b'\n');
+        let length = newline.unwrap_or(rest.len());
+        if self.state == ScanState::SkippedLine {
+            self.at += length;
+            self.start = self.at;
+            if newline.is_some() {
+                self.state = ScanState::Between;
+            }
+            return None;
+        }
+        let wanted = MAX_PREFIX - (self.at - self.start);
+        self.at += length.min(wanted);
+        if newline.is_none() && length < wanted {
+            return None;
+        }
+        let error = not_an_object(self.scanned());
+        self.state = ScanState::SkippedLine;
+        self.start = self.at;
+        Some((error, Vec::new()))
+    }
+}
+
+/// One JSON object, as text. Its syntax within the outer braces is still unchecked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// The text, as [decoded](RawFrame::decode).
+    pub text: String,
+}
+
+impl Iterator for FrameReader {
+    type Item = Result<Frame, FrameError>;
+
+    fn next(&mut self) -> Option<Result<Frame, FrameError>> {
+        Some(match self.next_raw()? {
+            Ok(frame) => {
+                let frame = frame.decode()?.map(|text| Frame { text });
+                frame.map_err(|(error, _)| error)
+            }
+            Err((error, _)) => Err(error),
+        })
+    }
+}
+
+/// The state after the scan of a reported object has stopped.
+const fn state_after(end: Option<&ObjectEnd>) -> ScanState {
+    match end {
+        None | Some(Err(FrameError::TooDeep)) => ScanState::SkippedObject,
+        Some(Err(FrameError::Mismatch { .. })) => ScanState::SkippedLine,
+        Some(_) => ScanState::Between,
+    }
 }
 
 /// Appends received bytes. The buffer grows to twice its size, as a `Vec` does, but without a permit it stays within
@@ -269,9 +355,9 @@ pub(super) fn append(buffer: &mut Vec<u8>, bytes: &[u8]) {
 /// One JSON object that has only been scanned for its end, or a message. Another thread may parse it.
 #[derive(Debug)]
 pub struct RawFrame {
-    pub(super) bytes: Vec<u8>,
+    bytes: Vec<u8>,
     /// Whether it may contain `NaN` or `Infinity`. `None` for a message, which is not scanned yet.
-    pub(super) has_literals: Option<bool>,
+    has_literals: Option<bool>,
 }
 
 impl RawFrame {
@@ -346,22 +432,22 @@ fn one_object(text: &[u8]) -> Result<bool, FrameError> {
 const _: () = assert!(MAX_NESTING <= u128::BITS as usize, "one bit per level");
 
 /// Why a scan of an object stops: its last brace, or a fault. A newline is such a fault too.
-pub(super) type ObjectEnd = Result<(), FrameError>;
+type ObjectEnd = Result<(), FrameError>;
 
 /// State of the scan in an object: the open brackets, and whether it is inside a string.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Nesting {
+struct Nesting {
     depth: usize,
     /// One bit per open level, the innermost last: 1 for a bracket, 0 for a brace. Holds [`MAX_NESTING`] levels.
     brackets: u128,
     in_string: bool,
     escaped: bool,
     /// Whether there was an `N` or an `I` outside strings. Only then can there be a `NaN` or an `Infinity`.
-    pub(super) has_literals: bool,
+    has_literals: bool,
 }
 
 impl Nesting {
-    pub(super) const fn new() -> Self {
+    const fn new() -> Self {
         Self {
             depth: 0,
             brackets: 0,
@@ -373,7 +459,7 @@ impl Nesting {
 
     /// Continues with `bytes`. Returns the number of scanned bytes and the reason for the stop. The scan stops before
     /// a newline, and after any other fault or end.
-    pub(super) fn scan(&mut self, bytes: &[u8]) -> (usize, Option<ObjectEnd>) {
+    fn scan(&mut self, bytes: &[u8]) -> (usize, Option<ObjectEnd>) {
         let mut at = 0;
         while let Some(&byte) = bytes.get(at) {
             if self.in_string {

@@ -8,11 +8,9 @@ pub mod frame;
 pub mod json;
 pub mod lines;
 pub(crate) mod literals;
-mod malformed;
 pub mod opening;
 pub mod series;
 pub(crate) mod text;
-mod values;
 pub mod websocket;
 
-pub use self::malformed::Frame;
+pub use self::frame::Frame;

@@ -7,17 +7,14 @@
 use bytes::Bytes;
 use serde_json::value::RawValue;
 
-use super::{Computed, Present, StudyWork, arm_of, with_period};
+use super::{Changed, Computed, Present, StudyWork};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
-use crate::math::pid::Setpoint;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
-use crate::protocol::op::fields::{Bound, Fields, Rejections, mistyped};
+use crate::protocol::op::fields::{Fields, Rejections, mistyped};
 use crate::protocol::wire::json;
-use crate::services::arm::{SetGains, SetParams};
 use crate::services::{Address, Ask};
-use crate::study::control_loop::ControlLoop;
 use crate::study::method::{Analysis, Given, MethodError, NAMES, Swing, Typed};
 use crate::study::method::{analyse, named, swings};
 use crate::study::tableau::{MAX_STAGES, Pair, coefficient};
@@ -31,14 +28,8 @@ request! {
     pub struct AnalyseMethod<N> -> Result<Box<Analysed>, ArmError>, |fields| {
         /// The method. The catalog requires it: without it the request is rejected.
         method: Option<Given> = read(&mut fields),
-        /// Changed gains.
-        gains: Option<SetGains<N>> = fields.object("gains", SetGains::from_fields),
-        /// Changed parameters of the arm.
-        params: Option<SetParams<N>> = fields.object("params", SetParams::from_fields),
-        /// The setpoint \[rad\], at rest.
-        setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
-        /// The time between two runs of the control law \[s\], not negative; 0 for every step.
-        control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
+        /// Changes of the present loop.
+        changed: Changed<N> = Changed::read(&mut fields),
     }
 
     fn write(answer: Self::Answer, to: &Address) -> Bytes {
@@ -216,21 +207,12 @@ impl<const N: usize> Computed<N> for AnalyseMethod<N> {
 
     fn work(self, present: Present<N>) -> Self::Work {
         StudyWork::new::<N>(async move {
-            let present = present.control;
-            let arm = arm_of(self.params.as_ref(), present.arm)?;
-            let gains = self.gains.as_ref();
-            let control = ControlLoop {
-                arm,
-                gains: gains.map_or(present.gains, |gains| gains.applied_to(&present.gains)),
-                setpoint: self.setpoint.map_or(present.setpoint, Setpoint::at),
-                period: with_period(present.period, self.control_period),
-                ..present
-            };
+            let control = self.changed.applied_to(&present.control)?;
             let given = self
                 .method
                 .unwrap_or_else(|| Given::new(Pair::of(control.method)));
             Ok(Box::new(Analysed {
-                beside: swings(&arm).await,
+                beside: swings(&control.arm).await,
                 found: analyse(given, control).await,
             }))
         })

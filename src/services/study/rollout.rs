@@ -10,17 +10,12 @@ use std::time::Duration;
 use bytes::Bytes;
 use serde::{Serialize, Serializer};
 
-use super::{
-    Beside, Computed, NUMBER_BYTES, Present, Refused, RobotSettings, Work, arm_of, state_of,
-    with_period,
-};
+use super::{Beside, Changed, Computed, NUMBER_BYTES, Present, Refused, Work};
 use crate::math::arm::ArmError;
-use crate::math::integrator::Method;
-use crate::math::pid::{Gains, Setpoint};
+use crate::math::pid::Gains;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::Address;
-use crate::services::arm::{SetGains, SetParams};
-use crate::study::control_loop::{ControlLoop, no_control};
+use crate::study::control_loop::no_control;
 use crate::study::paused::Paused;
 use crate::study::rollout::{
     Course, MAX_SAMPLES, Rollout, RolloutError, RolloutRequest, most_bytes, rollout, rollout_along,
@@ -33,26 +28,11 @@ request! {
     /// Runs the arm offline.
     #[derive(Debug, Clone, PartialEq, Default)]
     pub struct RunOffline<N> -> RunAnswer<N>, |fields| {
-        /// Initial positions \[rad\].
-        q: Option<[f64; N]> = super::joints(&mut fields, ["q", "q0"]),
-        /// Initial velocities \[rad/s\].
-        qd: Option<[f64; N]> = super::joints(&mut fields, ["qd", "qdot0"]),
+        /// Changes of the present loop and state. Without gains the arm is free. A missing member of gains is that of a
+        /// new arm.
+        changed: Changed<N> = Changed::read(&mut fields),
         /// Duration \[s\], greater than 0.
         duration: Option<f64> = fields.number("duration", Bound::Positive),
-        /// Length of a step \[s\], greater than 0.
-        timestep: Option<f64> = fields.number("timestep", Bound::Positive),
-        /// The time between two runs of the control law \[s\], not negative; 0 for every step.
-        control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
-        /// Friction, limits, sensors and delay.
-        robot: RobotSettings<N> = RobotSettings::read(&mut fields),
-        /// The method that takes the steps.
-        method: Option<Method> = fields.choice("integrator", &Method::ALL, Method::name),
-        /// Changed parameters of the arm.
-        params: Option<SetParams<N>> = fields.object("params", SetParams::from_fields),
-        /// The gains. Without them the arm is free. A missing member is that of a new arm.
-        gains: Option<SetGains<N>> = fields.object("gains", SetGains::from_fields),
-        /// The setpoint \[rad\], at rest.
-        setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
         /// The number of samples.
         samples: Option<u64> = fields.count("samples", 2..=MAX_SAMPLES),
         /// Whether to run a reference too.
@@ -216,22 +196,11 @@ impl<const N: usize> Work<RunAnswer<N>> for RolloutWork<N> {
 impl<const N: usize> RunOffline<N> {
     /// The request for the run, with the present settings for missing fields.
     pub(crate) fn request(&self, present: &Present<N>) -> Result<RolloutRequest<N>, ArmError> {
-        let control = &present.control;
-        let arm = arm_of(self.params.as_ref(), control.arm)?;
-        let gains = self.gains.as_ref();
-        let setpoint = self.setpoint.map(Setpoint::at);
+        let (control, free) = (&present.control, no_control());
+        let changed = &self.changed;
         Ok(RolloutRequest {
-            control: self.robot.applied_to(ControlLoop {
-                arm,
-                // Without gains there is no control.
-                gains: gains.map_or(no_control(), |gains| gains.applied_to(&Gains::default())),
-                setpoint: setpoint.unwrap_or(control.setpoint),
-                method: self.method.unwrap_or(control.method),
-                timestep: self.timestep.unwrap_or(control.timestep),
-                period: with_period(control.period, self.control_period),
-                ..*control
-            })?,
-            start: state_of(self.q, self.qd, &present.state),
+            control: changed.with_gains(control, free, &Gains::default())?,
+            start: changed.state(&present.state),
             duration: self.duration.unwrap_or(DEFAULT_DURATION),
             samples: self.samples.unwrap_or(DEFAULT_SAMPLES),
             reference: self.reference.unwrap_or(false),

@@ -7,16 +7,11 @@
 
 use bytes::Bytes;
 
-use super::{Computed, Present, RobotSettings, StudyWork};
-use super::{arm_of, state_of, with_period};
+use super::{Changed, Computed, Present, StudyWork};
 use crate::math::arm::ArmError;
-use crate::math::integrator::Method;
-use crate::math::pid::Setpoint;
-use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::protocol::op::fields::{Fields, Rejections};
 use crate::services::Address;
-use crate::services::arm::{SetGains, SetParams};
 use crate::study::clocks::{ClockLimits, clock_limits};
-use crate::study::control_loop::ControlLoop;
 use crate::study::motion::{FREE_SECONDS, Motion};
 use crate::study::stability::{Limits, search_limits};
 
@@ -27,22 +22,8 @@ request! {
     /// Predicts the largest stable timesteps of a control loop.
     #[derive(Debug, Clone, PartialEq, Default)]
     pub struct PredictStability<N> -> Result<Box<Predicted<N>>, ArmError>, |fields| {
-        /// The method that takes the steps.
-        method: Option<Method> = fields.choice("integrator", &Method::ALL, Method::name),
-        /// Changed gains.
-        gains: Option<SetGains<N>> = fields.object("gains", SetGains::from_fields),
-        /// Changed parameters of the arm.
-        params: Option<SetParams<N>> = fields.object("params", SetParams::from_fields),
-        /// The setpoint \[rad\], at rest.
-        setpoint: Option<[f64; N]> = fields.array("setpoint", Bound::Finite),
-        /// The time between two runs of the control law \[s\], not negative; 0 for every step.
-        control_period: Option<f64> = fields.number("control_period", Bound::NonNegative),
-        /// Friction, limits, sensors and delay.
-        robot: RobotSettings<N> = RobotSettings::read(&mut fields),
-        /// Positions from which the motion begins \[rad\].
-        q: Option<[f64; N]> = fields.array("q", Bound::Finite),
-        /// Velocities there \[rad/s\].
-        qd: Option<[f64; N]> = fields.array("qd", Bound::Finite),
+        /// Changes of the present loop, and the state from which the motion begins.
+        changed: Changed<N> = Changed::read(&mut fields),
     }
 
     fn write(answer: Result<Box<Predicted<N>>, ArmError>, to: &Address) -> Bytes {
@@ -96,8 +77,6 @@ pub struct Predicted<const N: usize> {
     pub is_free: bool,
 }
 
-// ---- reading and writing --------------------------------------------------------------------------------------------
-
 // ---- work -----------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> Computed<N> for PredictStability<N> {
@@ -105,8 +84,8 @@ impl<const N: usize> Computed<N> for PredictStability<N> {
 
     fn work(self, present: Present<N>) -> Self::Work {
         StudyWork::new::<N>(async move {
-            let control = control_loop(&self, &present.control)?;
-            let start = state_of(self.q, self.qd, &present.state);
+            let control = self.changed.applied_to(&present.control)?;
+            let start = self.changed.state(&present.state);
             Ok(Box::new(Predicted {
                 motion: Motion::ahead(&control, &start),
                 clocks: clock_limits(&control),
@@ -115,22 +94,4 @@ impl<const N: usize> Computed<N> for PredictStability<N> {
             }))
         })
     }
-}
-
-/// The loop of the request.
-fn control_loop<const N: usize>(
-    ask: &PredictStability<N>,
-    present: &ControlLoop<N>,
-) -> Result<ControlLoop<N>, ArmError> {
-    let arm = arm_of(ask.params.as_ref(), present.arm)?;
-    let gains = ask.gains.as_ref();
-    let setpoint = ask.setpoint.map(Setpoint::at);
-    ask.robot.applied_to(ControlLoop {
-        arm,
-        gains: gains.map_or(present.gains, |gains| gains.applied_to(&present.gains)),
-        setpoint: setpoint.unwrap_or(present.setpoint),
-        method: ask.method.unwrap_or(present.method),
-        period: with_period(present.period, ask.control_period),
-        ..*present
-    })
 }

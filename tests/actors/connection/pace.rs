@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::virtual_time::Watched;
-use pendularm::actors::gateway::connection::{Connection, Ends};
+use pendularm::actors::gateway::connection::{self, Ends};
 use tokio::io::{AsyncReadExt, duplex};
 use tokio::time::Instant;
 
@@ -21,7 +21,7 @@ async fn lateness(queue_length: u64, a_second: u32, chunk: usize) -> (Duration, 
     theirs.on_write = Box::new(move |bytes| count.set(count.get() + bytes.len()));
     let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
     let (source, asked) = (Rc::clone(&unread), Rc::clone(&queries));
-    Connection::start_with(
+    connection::start(
         Some(Box::new(move || {
             asked.set(asked.get() + 1);
             Some(source.get())

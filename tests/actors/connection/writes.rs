@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::virtual_time::Watched;
-use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::connection::{self, Ends};
 use tokio::io::AsyncWriteExt;
 
 #[test]
@@ -28,7 +28,10 @@ fn several_frames_leave_in_one_write_but_not_to_a_client_that_ends_no_line() {
                 let frames = bytes.iter().filter(|&&byte| byte == b'\n').count();
                 log.borrow_mut().push(frames);
             });
-            Connection::start_on(
+            connection::start(
+                None,
+                Arc::default(),
+                Ends::default(),
                 stream,
                 gateway.registry.clone(),
                 Arc::clone(&gateway.gauges),

@@ -20,7 +20,9 @@ use actix::prelude::*;
 use pendularm::actors::arm::sim::{
     ArmSettings, AttachNodes, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetParams,
 };
-use pendularm::actors::compute::study::{IntegrationStep, PredictStability, RunOffline, Study};
+use pendularm::actors::compute::study::{
+    Changed, IntegrationStep, PredictStability, RunOffline, Study,
+};
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::resources::work_clock;

@@ -10,12 +10,15 @@ use crate::system::in_real_time;
 fn heavy() -> RunOffline<2> {
     RunOffline {
         duration: Some(10.0),
-        timestep: Some(1e-6),
         reference: Some(true),
-        gains: Some(SetGains {
-            kp: Some([1.0; 2]),
-            ..SetGains::default()
-        }),
+        changed: Changed {
+            timestep: Some(1e-6),
+            gains: Some(SetGains {
+                kp: Some([1.0; 2]),
+                ..SetGains::default()
+            }),
+            ..Changed::default()
+        },
         ..RunOffline::default()
     }
 }
@@ -24,7 +27,10 @@ fn heavy() -> RunOffline<2> {
 fn short<const N: usize>() -> RunOffline<N> {
     RunOffline {
         duration: Some(0.01),
-        timestep: Some(0.001),
+        changed: Changed {
+            timestep: Some(0.001),
+            ..Changed::default()
+        },
         ..RunOffline::default()
     }
 }

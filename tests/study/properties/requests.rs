@@ -258,7 +258,7 @@ fn a_plan_with_a_period_that_cannot_be_counted_is_refused() {
         r#"{"error":0.1,"gains":{"kp":[1e-300,1e-300]},"params":{"gravity":0},"control_period":1e149}"#,
     ] {
         assert!(
-            pieces::<2, PlanRun<2>>(Service::Plan, text).unwrap() < 1000,
+            pieces::<2, Beside<PlanRun<2>>>(Service::Plan, text).unwrap() < 1000,
             "{text}"
         );
     }

@@ -18,6 +18,7 @@ pub use self::messages::{
 };
 pub use self::node::ArmSim;
 pub use self::orders::ArmOrder;
+pub use self::requests::attach;
 pub use self::turn::{TURN, TURN_MESSAGES};
 pub use crate::live::{
     ArmEvent, ArmListener, GoalOrder, GoalProgress, LEAST_PAUSE, MoveSetpoint, Obstacle,

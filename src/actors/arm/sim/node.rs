@@ -1,9 +1,9 @@
 //! The actor: reads the clock, advances the simulation, wakes for the next tick.
 //!
-//! The arm wakes 60 times a second, or 10 times while nothing observes it. It advances to the present time before it handles a message, so every answer has
-//! the present state. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond that
-//! are taken after [`STEP_PAUSE`]. Waiting messages do not delay the wake-up, because it is checked at the end of every
-//! [turn](super::turn).
+//! The arm wakes 60 times a second, or 10 times while nothing observes it. It advances to the present time before it
+//! handles a message, so every answer has the present state. Work per wake-up is bounded by
+//! [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond that are taken after [`STEP_PAUSE`]. Waiting messages do
+//! not delay the wake-up, because it is checked at the end of every [turn](super::turn).
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit. An
 //! answer that the arm is at rest follows all news of goals.
@@ -19,7 +19,7 @@ use tokio::time::Instant;
 use super::messages::{ArmSettings, AttachNodes, HeldLimit};
 use super::turn::Turn;
 use super::world::ArmWorld;
-use crate::actors::node::{Barrier, ClientLink, Interest, Publish, Reply};
+use crate::actors::node::{Barrier, ClientLink, Interest, Publish, Reply, Unserved};
 use crate::actors::resources::gauges::Gauges;
 use crate::live::{GoalProgress, LiveArm, PUBLISH_RATE, STEP_PAUSE, StepsAsked};
 use crate::math::arm::Arm;
@@ -36,24 +36,24 @@ const TICK: u64 = 1_000_000_000 / PUBLISH_RATE as u64;
 /// The node `arm_sim` for an arm of `N` links.
 pub struct ArmSim<const N: usize> {
     pub(super) arm: LiveArm<N, ArmWorld<N>>,
-    pub(super) turn: Turn,
+    turn: Turn,
     /// Requested steps that are not yet taken, at most one request per client. While there are any, the next turn is
     /// scheduled.
-    pub(super) steps: VecDeque<Steps<N>>,
+    steps: VecDeque<Steps<N>>,
     /// Whether they are being taken.
-    pub(super) is_stepping: bool,
+    is_stepping: bool,
     /// The client with the commanded effort.
     pub(super) commander: Option<ClientLink>,
     /// The node that predicts limits, if there is one.
-    pub(super) study: Option<Recipient<HeldLimit<N>>>,
+    study: Option<Recipient<HeldLimit<N>>>,
     /// The actors that inform clients of goals, which get barriers.
-    pub(super) goal_reporters: Vec<Recipient<Barrier>>,
+    goal_reporters: Vec<Recipient<Barrier>>,
     /// The next wake-up.
     tick: Option<Tick>,
     /// Wake-ups that have been scheduled.
     scheduled: u64,
     /// Feedback of the goal that has been sent and not yet arrived.
-    pub(super) feedback_sent: Option<Pin<Box<RecipientRequest<GoalProgress<N>>>>>,
+    feedback_sent: Option<Pin<Box<RecipientRequest<GoalProgress<N>>>>>,
 }
 
 /// A scheduled wake-up.
@@ -110,7 +110,8 @@ impl<const N: usize> ArmSim<N> {
     }
 
     /// Wakes at the next multiple of the tick's length, or at a later one while nothing observes the arm. Missed ticks
-    /// are skipped, not made up.
+    /// are skipped, not made up. tokio sorts a wait of more than 64 ms in two stages, so an arm at rest has two wake-ups for
+    /// each tick.
     fn schedule_tick(&mut self, ctx: &mut Context<Self>) {
         let count = match self.commander {
             Some(_) => 1,
@@ -198,6 +199,68 @@ impl<const N: usize> ArmSim<N> {
         }
     }
 
+    // ---- requested steps ---------------------------------------------------------------------------------------------
+
+    /// Takes the first row of the steps. Steps that are checked wait for those of others.
+    pub(super) fn step(&mut self, steps: Steps<N>, ctx: &mut Context<Self>) {
+        if self.is_stepping && self.arm.judges_steps() {
+            return self.steps.push_back(steps);
+        }
+        self.take_row(steps);
+        if !self.is_stepping {
+            self.go_on_stepping(ctx);
+        }
+    }
+
+    /// Refuses all requested steps that are not taken.
+    pub(super) fn refuse_steps(&mut self, why: Unserved) {
+        for mut steps in self.steps.drain(..) {
+            steps.reply.refuse(why);
+        }
+    }
+
+    /// Yields to all other messages, and waits until the goal's feedback has been published. Otherwise the registry
+    /// would get it faster than it delivers it. Then the remaining requests continue, one after the other.
+    fn go_on_stepping(&mut self, ctx: &mut Context<Self>) {
+        let feedback_sent = self.feedback_sent.take();
+        self.is_stepping = feedback_sent.is_some() || !self.steps.is_empty();
+        if !self.is_stepping {
+            return;
+        }
+        let reporters = self.goal_reporters.clone();
+        let others = async move {
+            let Some(progress) = feedback_sent else {
+                return tokio::task::yield_now().await;
+            };
+            let _ = progress.await;
+            pass_barriers(&reporters).await;
+        };
+        ctx.spawn(others.into_actor(self).map(|(), arm, ctx| {
+            if let Some(next) = arm.steps.pop_front() {
+                arm.take_row(next);
+            }
+            arm.go_on_stepping(ctx);
+        }));
+    }
+
+    /// Takes the next row of steps. Answers after the last one, otherwise puts the request at the end of the queue.
+    /// Nothing is stepped for a client that has left, because another one may have reset the arm since.
+    fn take_row(&mut self, mut steps: Steps<N>) {
+        if steps.reply.caller_has_left() {
+            return steps.reply.refuse(Unserved::CALLER_GONE);
+        }
+        let (stepped, progress) = self.arm.take_row(&mut steps.asked);
+        if let (Some(progress), Some(owner)) = (progress, &self.arm.world.owner) {
+            self.feedback_sent = Some(Box::pin(owner.send(progress)));
+        }
+        match stepped {
+            Some(stepped) => steps.reply.conclude(Ok(stepped)),
+            None => self.steps.push_back(steps),
+        }
+    }
+
+    // ---- messages of others -----------------------------------------------------------------------------------------
+
     /// Answers after all feedback and results of goals have been sent. None may follow the answer that the arm is at
     /// rest.
     pub(super) fn after_barriers(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
@@ -269,7 +332,7 @@ impl<const N: usize> Handler<AttachNodes<N>> for ArmSim<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 /// Sends a barrier to each of these actors, and waits until all have answered.
-pub(super) fn pass_barriers(reporters: &[Recipient<Barrier>]) -> impl Future<Output = ()> + use<> {
+fn pass_barriers(reporters: &[Recipient<Barrier>]) -> impl Future<Output = ()> + use<> {
     let asked: Vec<_> = reporters.iter().map(|one| one.send(Barrier)).collect();
     async move {
         for one in asked {

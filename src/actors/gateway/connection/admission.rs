@@ -1,20 +1,21 @@
-//! Admission: the conditions under which a client is served, for every protocol.
+//! Admission: the conditions under which a client is served, for every protocol, and its way to a place.
 //!
 //! **Invariant:** with a token set, bytes after a first frame without the token are not read. Any number of clients
 //! without the token cannot block a client with the token.
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use bytes::BytesMut;
-use tokio::io::AsyncRead;
-use tokio::time::{Instant, timeout_at};
+use actix::prelude::*;
+use bytes::{Bytes, BytesMut};
+use tokio::time::{Instant, sleep};
 
-use super::transport::read_some;
-use crate::actors::gateway::limits::HEAD_TIME;
-use crate::actors::resources::places::Slots;
-use crate::protocol::op::token::{AuthError, Token};
-use crate::protocol::op::{self, Incoming};
-use crate::protocol::wire::frame::FrameReader;
+use super::transport::Transport;
+use crate::actors::gateway::limits::{LOOK_AGAIN, OPENING_TIME};
+use crate::actors::gateway::registry::{Connect, CountRefusal, HeldPlace, Outlets, Registry};
+use crate::actors::resources::places::{HeldSlot, Refused, Slots};
+use crate::actors::resources::unread::Ends;
+use crate::protocol::op::token::Token;
 #[cfg(feature = "web")]
 use crate::web::Site;
 
@@ -37,30 +38,62 @@ pub struct Admission {
     pub newcomers: Slots,
 }
 
-// ---- the token over raw TCP: in the first frame ---------------------------------------------------------------------
+/// A client whose protocol is being detected.
+pub(super) struct ClientSession {
+    pub(super) registry: Addr<Registry>,
+    pub(super) admission: Arc<Admission>,
+    pub(super) ends: Ends,
+    pub(super) outlets: Outlets,
+}
 
-/// Reads a first frame until `due`. All bytes read stay in `first`. Returns its op and its `id`, or why there is no frame.
-pub(super) async fn first_frame<S: AsyncRead + Unpin>(
-    stream: &mut S,
-    first: &mut BytesMut,
-    due: Instant,
-) -> Result<Incoming, AuthError> {
-    let mut frames = FrameReader::new();
-    let mut seen = 0;
-    loop {
-        frames.push(first.get(seen..).unwrap_or_default());
-        seen = first.len();
-        if let Some(frame) = frames.next() {
-            let frame = frame.map_err(|_| AuthError::NotShown)?;
-            return Ok(op::read(&frame.text));
+/// A client that exchanges frames from now on.
+pub(super) struct Opened<S> {
+    /// Its place, or the status with the reason why it gets none.
+    pub(super) place: Result<HeldPlace, Bytes>,
+    pub(super) transport: Transport<S>,
+    /// Bytes that were already read.
+    pub(super) first: BytesMut,
+}
+
+impl ClientSession {
+    /// Registers the client.
+    pub(super) async fn connect(&self, may_use_kept: bool) -> Result<HeldPlace, Refused> {
+        let connect = Connect {
+            outlets: self.outlets.clone(),
+            from: self.ends.peer.ip().to_canonical(),
+            may_use_kept,
+        };
+        let answer = self.registry.send(connect).await;
+        answer.unwrap_or(Err(Refused::Closed))
+    }
+
+    /// Takes a place, possibly a kept one. If none is free, waits up to [`OPENING_TIME`] for one.
+    pub(super) async fn wait_for_place(&self, slot: &mut HeldSlot) -> Result<HeldPlace, Refused> {
+        let due = Instant::now() + OPENING_TIME;
+        loop {
+            let place = self.connect(true).await;
+            if !matches!(place, Err(Refused::Full { .. })) || Instant::now() >= due {
+                return place;
+            }
+            tokio::select! {
+                _ = &mut *slot => return place,
+                () = sleep(LOOK_AGAIN) => {}
+            }
         }
-        if seen > MAX_AUTH_BYTES {
-            return Err(AuthError::TooMuch(MAX_AUTH_BYTES));
+    }
+
+    /// Counts a client that gets no place. Returns the reason.
+    pub(super) fn turn_away(&self, why: Refused) -> String {
+        if matches!(why, Refused::Full { .. }) {
+            self.registry.do_send(CountRefusal);
         }
-        match timeout_at(due, read_some(stream, first)).await {
-            Err(_) => return Err(AuthError::TooLate(HEAD_TIME)),
-            Ok(Ok(0) | Err(_)) => return Err(AuthError::NotShown),
-            Ok(Ok(_)) => {}
-        }
+        why.to_string()
+    }
+
+    /// Delays the answer to a wrong token. A correct token is admitted at once.
+    pub(super) async fn delay_wrong_token(&self) {
+        let from = self.ends.peer.ip();
+        tracing::warn!(%from, "a client sent a wrong token");
+        sleep(WRONG_TOKEN_TIME).await;
     }
 }

@@ -10,13 +10,13 @@ use std::task::{Poll, ready};
 use bytes::BytesMut;
 use tokio::time::Instant;
 
-use super::session::{ClientSession, Opened};
+use super::admission::{ClientSession, Opened};
 use super::transport::{ClientStream, Transport};
 use crate::actors::gateway::registry::{HeldPlace, Request};
 use crate::actors::resources::places::{HeldSlot, Refused};
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Incoming, Op, Verbosity};
-use crate::web::serve::{self, Gate};
+use crate::web::serve::{self as requests, Gate};
 
 /// A client without a place: its slot, and the reason.
 pub(super) type Newcomer = (HeldSlot, Refused);
@@ -60,40 +60,38 @@ impl Gate for HttpGate<'_> {
     }
 }
 
-impl ClientSession {
-    /// Answers the requests of a client. Returns the client if it opens a WebSocket. A newcomer gets a place when its
-    /// first request is admitted.
-    pub(super) async fn serve_http<S: ClientStream>(
-        &self,
-        stream: S,
-        first: BytesMut,
-        due: Instant,
-        client: Result<HeldPlace, Newcomer>,
-    ) -> Option<Opened<S>> {
-        let gate = HttpGate {
-            session: self,
-            client: RefCell::new(Some(client)),
-        };
-        let (site, local) = (&self.admission.site, self.ends.local);
-        let served = serve::serve(stream, first, due, site, local, &gate, gate.evicted());
-        let (stream, behind) = served.await?;
-        let place = gate.client.into_inner()?.ok()?;
-        let quiet = Request {
-            from: place.id,
-            incoming: Incoming {
-                id: None,
-                op: Ok(Op::SetLevel {
-                    verbosity: Verbosity::NONE,
-                    errors: Some(ErrorForm::Text),
-                }),
-            },
-            permit: None,
-        };
-        let _ = self.registry.send(quiet).await;
-        Some(Opened {
-            place: Ok(place),
-            transport: Transport::socket(stream),
-            first: behind.into(),
-        })
-    }
+/// Answers the requests of a client. Returns the client if it opens a WebSocket. A newcomer gets a place when its
+/// first request is admitted.
+pub(super) async fn serve<S: ClientStream>(
+    session: &ClientSession,
+    stream: S,
+    first: BytesMut,
+    due: Instant,
+    client: Result<HeldPlace, Newcomer>,
+) -> Option<Opened<S>> {
+    let gate = HttpGate {
+        session,
+        client: RefCell::new(Some(client)),
+    };
+    let (site, local) = (&session.admission.site, session.ends.local);
+    let served = requests::serve(stream, first, due, site, local, &gate, gate.evicted());
+    let (stream, behind) = served.await?;
+    let place = gate.client.into_inner()?.ok()?;
+    let quiet = Request {
+        from: place.id,
+        incoming: Incoming {
+            id: None,
+            op: Ok(Op::SetLevel {
+                verbosity: Verbosity::NONE,
+                errors: Some(ErrorForm::Text),
+            }),
+        },
+        permit: None,
+    };
+    let _ = session.registry.send(quiet).await;
+    Some(Opened {
+        place: Ok(place),
+        transport: Transport::socket(stream),
+        first: behind.into(),
+    })
 }

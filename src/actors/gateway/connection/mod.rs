@@ -10,10 +10,10 @@
 
 pub mod admission;
 mod client;
+mod detection;
 #[cfg(feature = "web")]
 mod http;
 mod reader;
-mod session;
 #[cfg_attr(
     not(feature = "web"),
     allow(dead_code, reason = "only an HTTP request opens a WebSocket")
@@ -28,11 +28,10 @@ use std::task::{self, Poll};
 use actix::fut::wrap_future;
 use actix::prelude::*;
 
-use self::admission::Admission;
+use self::admission::{Admission, ClientSession, Opened};
 
 pub use self::client::Connection;
 use self::reader::ClientReader;
-use self::session::{ClientSession, Opened};
 pub use self::transport::ClientStream;
 use self::writer::ClientWriter;
 use super::registry::{Outlets, Registry};
@@ -42,65 +41,61 @@ use crate::actors::resources::unread;
 pub use crate::actors::resources::unread::Ends;
 use crate::protocol::outbox::flow::UnreadSource;
 
-impl<S: ClientStream> Connection<S> {
-    /// Starts the actor for `stream` in the current system. It requires no token.
-    pub fn start_on(stream: S, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Addr<Self> {
-        let (admission, ends) = (Arc::default(), Ends::default());
-        Self::start_with(None, admission, ends, stream, registry, gauges)
-    }
-
-    /// Starts the actor for a client that must be admitted. If `unread` is given, it returns the client's unread bytes.
-    /// Otherwise the system does.
-    pub fn start_with(
-        unread: Option<UnreadSource>,
-        admission: Arc<Admission>,
-        ends: impl Into<Ends>,
-        stream: S,
-        registry: Addr<Registry>,
-        gauges: Arc<Gauges>,
-    ) -> Addr<Self> {
-        let ends = ends.into();
-        let unread = unread.unwrap_or_else(|| Box::new(unread::source(ends)));
-        Self::create(|ctx| {
-            let connection = Self::new(ends, unread, registry, gauges);
-            let outlets = Outlets {
-                mailbox: ctx.address().recipient(),
-                backlog: Arc::clone(&connection.backlog),
-                gone: connection.gone.clone(),
-            };
-            let session = ClientSession {
-                registry: connection.registry.clone(),
-                admission,
-                ends,
-                outlets,
-            };
-            let opening = wrap_future(Box::pin(session.run(stream)));
-            let opening = opening.map(|opened, connection: &mut Self, ctx| match opened {
-                Some(opened) => connection.converse(opened, ctx),
-                None => ctx.stop(),
-            });
-            ctx.spawn(Part("session", opening));
-            connection
-        })
-    }
-
-    /// Reads and writes until the client disconnects, or has received all its messages.
-    fn converse(&mut self, opened: Opened<S>, ctx: &mut Context<Self>) {
-        self.transport = Some(opened.transport);
-        let reader = match opened.place {
-            Ok(place) => {
-                let reader = ClientReader::new(place.id, opened.first);
-                self.place = Some(place);
-                reader
-            }
-            Err(status) => {
-                self.refuse_with(status);
-                ClientReader::discarding(self)
-            }
+/// Starts the actor for `stream` in the current system. If `unread` is given, it returns the client's unread bytes.
+/// Otherwise the system does.
+pub fn start<S: ClientStream>(
+    unread: Option<UnreadSource>,
+    admission: Arc<Admission>,
+    ends: impl Into<Ends>,
+    stream: S,
+    registry: Addr<Registry>,
+    gauges: Arc<Gauges>,
+) -> Addr<Connection<S>> {
+    let ends = ends.into();
+    let unread = unread.unwrap_or_else(|| Box::new(unread::source(ends)));
+    Connection::create(|ctx| {
+        let connection = Connection::new(ends, unread, registry, gauges);
+        let outlets = Outlets {
+            mailbox: ctx.address().recipient(),
+            backlog: Arc::clone(&connection.backlog),
+            gone: connection.gone.clone(),
         };
-        ctx.spawn(Part("reader", reader));
-        ctx.spawn(Part("writer", ClientWriter::default()));
-    }
+        let session = ClientSession {
+            registry: connection.registry.clone(),
+            admission,
+            ends,
+            outlets,
+        };
+        let opening = wrap_future(Box::pin(detection::open(session, stream)));
+        let opening = opening.map(|opened, connection: &mut Connection<S>, ctx| match opened {
+            Some(opened) => converse(connection, opened, ctx),
+            None => ctx.stop(),
+        });
+        ctx.spawn(Part("session", opening));
+        connection
+    })
+}
+
+/// Reads and writes until the client disconnects, or has received all its messages.
+fn converse<S: ClientStream>(
+    connection: &mut Connection<S>,
+    opened: Opened<S>,
+    ctx: &mut Context<Connection<S>>,
+) {
+    connection.transport = Some(opened.transport);
+    let reader = match opened.place {
+        Ok(place) => {
+            let reader = ClientReader::new(place.id, opened.first);
+            connection.place = Some(place);
+            reader
+        }
+        Err(status) => {
+            connection.refuse_with(status);
+            ClientReader::discarding(connection)
+        }
+    };
+    ctx.spawn(Part("reader", reader));
+    ctx.spawn(Part("writer", ClientWriter::default()));
 }
 
 /// A future of the connection, with its name. A panic in it ends only this connection.

@@ -211,7 +211,7 @@ impl ClientReader {
             // An incomplete frame is an error.
             let unfinished = client.transport()?.finish();
             return Poll::Ready(Ok(unfinished.map_or(ReadStep::Cutting, |error| {
-                self.perform(client, Incoming::of_start(&[], &error), 0)
+                self.perform(client, op::read_start(&[], &error), 0)
             })));
         }
         self.bytes += self.chunk.len();
@@ -296,7 +296,7 @@ impl ClientReader {
                 ReadStep::Cutting
             }
             FramePart::Error(error, start) => {
-                self.perform(client, Incoming::of_start(&start, &error), 0)
+                self.perform(client, op::read_start(&start, &error), 0)
             }
         }
     }

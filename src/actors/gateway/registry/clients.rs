@@ -1,10 +1,8 @@
-//! Clients join and leave, and get their responses, statuses and refusals. Also the other requests of the runtime and its
-//! nodes.
+//! The clients of the registry: their places, and their responses, statuses and refusals.
 //!
-//! **Invariant:** a client has one entry from [`Connect`] to [`Disconnect`]. Its registrations end when it stops
-//! sending.
+//! **Invariant:** a client has one entry from [`Connect`] to its end. A frame made from a long one has its permit.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::Display;
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -14,58 +12,51 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::{Client, FrameOrigin, Outlets, Registry, ToClient};
+use super::messages::{Connect, Outlets, ToClient};
 use crate::actors::ConnectionId;
 use crate::actors::graph::registrations::{EntrySum, Registrations};
-use crate::actors::node::{
-    Attach, Barrier, ClientLink, Completion, FinishAll, FrameKind, Respond, TakeCensus, Tapped,
-};
-use crate::actors::resources::memory::{MAX_BACKLOG, MAX_LONG_BACKLOG, Pool, SHORT, cover};
-use crate::actors::resources::places::Refused;
-use crate::protocol::catalog::Service;
+use crate::actors::node::{ClientLink, Completion, Respond, Working};
+use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::memory::{MAX_BACKLOG, MAX_LONG_BACKLOG, Permit, Pool, SHORT, cover};
+use crate::actors::resources::places::{Places, Refused};
+use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, ErrorForm, Level};
 use crate::protocol::op::{GoalStatus, OpError, Verbosity};
+use crate::protocol::wire::json::Payload;
 
-/// The place of a registered client. Dropping it frees the place, even if the answer to [`Connect`] is lost.
-pub struct HeldPlace {
-    /// The client's id.
-    pub id: ConnectionId,
-    registry: Addr<Registry>,
+/// The sender of the frame that is being performed, and the frame's `id`.
+pub(super) struct FrameOrigin {
+    pub(super) from: ConnectionId,
+    pub(super) id: Option<Payload>,
 }
 
-impl Drop for HeldPlace {
-    fn drop(&mut self) {
-        self.registry.do_send(Disconnect(self.id));
-    }
-}
+// ---- one client -----------------------------------------------------------------------------------------------------
 
-/// A new client. From its connection. Returns its place.
-#[derive(Message)]
-#[rtype(result = "Result<HeldPlace, Refused>")]
-pub struct Connect {
-    /// The handles to its connection.
-    pub outlets: Outlets,
+/// The registry's entry of one client.
+pub(super) struct Client {
+    pub(super) outlets: Outlets,
+    /// The client, as the nodes get it.
+    pub(super) link: ClientLink,
     /// Its address.
-    pub from: IpAddr,
-    /// Whether it may use a kept place.
-    pub may_use_kept: bool,
+    from: IpAddr,
+    /// The sum of its registrations, and of its calls and goals that wait for other clients.
+    pub(super) entries: EntrySum,
+    pub(super) registered: Registrations,
+    /// The memory of long calls and answers of other clients that wait for it.
+    long_backlog: Pool,
+    /// Topics of the runtime's subscriptions that this client has explicitly unadvertised. Its messages there are
+    /// dropped until it advertises again.
+    pub(super) withdrawn: HashSet<Topic>,
+    /// The lowest level of statuses that it gets.
+    pub(super) verbosity: Verbosity,
+    /// The form in which it gets the reason of a failed call.
+    pub(super) error_form: ErrorForm,
+    /// Replaced when the client unsubscribes from the feedback of its goals, and dropped with the client.
+    pub(super) listening: Arc<()>,
+    /// What its calls to other clients hold, and the completion of all of them. Removed when the client
+    /// stops sending.
+    pub(super) calls: Option<(Working, Completion)>,
 }
-
-/// A client was refused because no place was free. From its connection.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct CountRefusal;
-
-/// The client has stopped sending. The registry withdraws its registrations. From its connection. The
-/// answer completes when the client's calls have been answered.
-#[derive(Message)]
-#[rtype(result = "Completion")]
-pub struct Retire(pub ConnectionId);
-
-/// The client has disconnected, and its output is gone. The registry frees its place. From its connection. Idempotent.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct Disconnect(pub ConnectionId);
 
 impl Client {
     /// Sends a status, a forwarded call or another client's response.
@@ -113,21 +104,32 @@ impl Client {
     }
 }
 
-// ---- the runtime and its nodes --------------------------------------------------------------------------------------
+// ---- all clients ----------------------------------------------------------------------------------------------------
 
-impl Handler<Connect> for Registry {
-    type Result = Result<HeldPlace, Refused>;
+/// All clients.
+#[derive(Default)]
+pub(super) struct Clients {
+    by_id: BTreeMap<ConnectionId, Client>,
+    pub(super) places: Places,
+    pub(super) gauges: Arc<Gauges>,
+    connections_made: u64,
+    /// The memory permit of the frame whose op is being performed, if that frame is long.
+    pub(super) permit: Option<Permit>,
+}
 
-    fn handle(&mut self, connect: Connect, ctx: &mut Context<Self>) -> Self::Result {
-        if self.closed.is_some() {
-            return Err(Refused::Closed);
-        }
-        let taken = self.clients.len();
+impl Clients {
+    /// Adds a client, if there is a place for it. `registry` passes on the nodes' frames for it.
+    pub(super) fn add(
+        &mut self,
+        connect: Connect,
+        registry: Recipient<Respond>,
+    ) -> Result<ConnectionId, Refused> {
+        let taken = self.by_id.len();
         self.places.check_free(taken, connect.may_use_kept)?;
         self.connections_made += 1;
         let id = ConnectionId(self.connections_made);
         let link = ClientLink {
-            registry: ctx.address().recipient(),
+            registry,
             connection: id,
             gone: connect.outlets.gone.clone(),
         };
@@ -144,122 +146,93 @@ impl Handler<Connect> for Registry {
             listening: Arc::default(),
             calls: Some(Completion::pending()),
         };
-        self.clients.insert(id, client);
-        self.gauges.set_connections(self.clients.len() as u64);
-        let registry = ctx.address();
-        Ok(HeldPlace { id, registry })
+        self.by_id.insert(id, client);
+        self.count();
+        Ok(id)
     }
-}
 
-impl Handler<CountRefusal> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, _: CountRefusal, _: &mut Context<Self>) {
-        let all = self.clients.values().map(|client| client.from);
-        self.places.warn_of_refusal(all, Instant::now());
-    }
-}
-
-impl Handler<Retire> for Registry {
-    type Result = Completion;
-
-    fn handle(&mut self, Retire(id): Retire, _: &mut Context<Self>) -> Completion {
-        self.withdraw(id);
-        let client = self.clients.get_mut(&id);
-        let calls = client.and_then(|client| client.calls.take());
-        calls.map_or_else(Completion::at_once, |(_, all)| all)
-    }
-}
-
-impl Handler<Disconnect> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, Disconnect(id): Disconnect, _: &mut Context<Self>) {
-        self.withdraw(id);
-        self.requests.forget_caller(id);
-        if let Some(client) = self.clients.remove(&id) {
+    /// Removes a client that has disconnected.
+    pub(super) fn remove(&mut self, id: ConnectionId) {
+        if let Some(client) = self.by_id.remove(&id) {
             client.link.gone.set();
-            self.gauges.set_connections(self.clients.len() as u64);
+            self.count();
         }
     }
-}
 
-impl Handler<Attach> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, Attach(nodes): Attach, _: &mut Context<Self>) {
-        self.nodes = nodes;
+    fn count(&self) {
+        self.gauges.set_connections(self.by_id.len() as u64);
     }
-}
 
-impl Handler<Barrier> for Registry {
-    type Result = ();
+    pub(super) fn get(&self, id: ConnectionId) -> Option<&Client> {
+        self.by_id.get(&id)
+    }
 
-    fn handle(&mut self, _: Barrier, _: &mut Context<Self>) {}
-}
+    pub(super) fn get_mut(&mut self, id: ConnectionId) -> Option<&mut Client> {
+        self.by_id.get_mut(&id)
+    }
 
-impl Handler<FinishAll> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, _: FinishAll, _: &mut Context<Self>) {
-        for client in self.clients.values() {
+    /// Every connection sends its queue and ends.
+    pub(super) fn finish_all(&self) {
+        for client in self.by_id.values() {
             client.outlets.mailbox.do_send(ToClient::Finish);
         }
     }
-}
 
-impl Handler<TakeCensus> for Registry {
-    type Result = MessageResult<TakeCensus>;
-
-    fn handle(&mut self, _: TakeCensus, _: &mut Context<Self>) -> Self::Result {
-        MessageResult(self.providers.census(self.topics.listed()))
+    /// Counts a client that was refused because no place was free.
+    pub(super) fn count_refusal(&mut self) {
+        let all = self.by_id.values().map(|client| client.from);
+        self.places.warn_of_refusal(all, Instant::now());
     }
-}
 
-impl Handler<Respond> for Registry {
-    type Result = ();
+    // ---- frames to one of them --------------------------------------------------------------------------------------
 
-    fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
-        let Some(client) = self.clients.get(&respond.connection) else {
-            return;
-        };
-        match respond.kind {
-            FrameKind::Status(level) if !client.verbosity.wants(level) => {}
-            FrameKind::Status(_) | FrameKind::End => client.send(respond.frame),
-            FrameKind::Feedback => client.deliver_feedback(respond.frame),
-            FrameKind::Answer(service) => {
-                if let Some(tap) = &mut self.tap {
-                    tap(Tapped::Answered {
-                        to: respond.connection,
-                        service,
-                        frame: &respond.frame,
-                    });
-                }
-                client.respond(respond.frame, Some(service));
-            }
+    /// The frame with the memory permit of the long frame from which it was made.
+    pub(super) fn covered(&self, frame: Bytes) -> Bytes {
+        cover(self.permit.as_ref(), frame)
+    }
+
+    pub(super) fn send_status(&self, origin: &FrameOrigin, level: Level, msg: &str) {
+        if let Some(client) = self.get(origin.from)
+            && client.verbosity.wants(level)
+        {
+            client.send(self.covered(messages::status(level, msg, origin.id.as_ref())));
         }
     }
-}
 
-impl Registry {
-    /// Withdraws a client's registrations. The cleanup ends the calls and goals that wait for its answer, because there
-    /// may be many.
-    fn withdraw(&mut self, id: ConnectionId) {
-        let Some(client) = self.clients.get_mut(&id) else {
-            return;
-        };
-        let registered = std::mem::take(&mut client.registered);
-        for topic in registered.advertised.keys() {
-            self.topics.remove_publisher(topic);
+    /// Sends an error status with the reason to the sender of a refused frame.
+    pub(super) fn refuse(&self, origin: &FrameOrigin, why: &impl Display) {
+        let why = why.to_string();
+        tracing::debug!(connection = origin.from.0, why, "refused");
+        self.send_status(origin, Level::Error, &why);
+    }
+
+    /// Answers a call with `result: false` and the reason. `own` is the service, if a node of the runtime serves it.
+    pub(super) fn refuse_call(
+        &self,
+        origin: &FrameOrigin,
+        service: &str,
+        why: &impl Display,
+        own: Option<Service>,
+    ) {
+        if let Some(client) = self.get(origin.from) {
+            let (id, form) = (origin.id.as_ref(), client.error_form);
+            let frame = messages::failure(service, id, &why.to_string(), form);
+            client.respond(self.covered(frame), own);
         }
-        for topic in &registered.subscribed {
-            self.drop_subscriber(topic, id);
-        }
-        for (kind, name) in registered.served.keys() {
-            self.providers.withdraw(*kind, name, id);
-        }
-        if self.requests.waiting_for(id).is_some() {
-            self.gone.push_back(id);
+    }
+
+    /// Ends a goal that has no result, for this reason.
+    pub(super) fn end_goal(
+        &self,
+        origin: &FrameOrigin,
+        action: &str,
+        why: &impl Display,
+        status: GoalStatus,
+    ) {
+        if let Some(client) = self.get(origin.from) {
+            let (id, why) = (origin.id.as_ref(), why.to_string());
+            let frame = messages::action_result(action, id, &why, status as u8, false);
+            client.send(self.covered(frame));
         }
     }
 
@@ -272,25 +245,5 @@ impl Registry {
             }
             OpError::Status(problem) => self.refuse(origin, problem),
         }
-    }
-
-    /// Sends an error status with the reason to the sender of a refused frame.
-    pub(super) fn refuse(&self, origin: &FrameOrigin, why: &impl Display) {
-        let why = why.to_string();
-        tracing::debug!(connection = origin.from.0, why, "refused");
-        self.send_status(origin, Level::Error, &why);
-    }
-
-    pub(super) fn send_status(&self, origin: &FrameOrigin, level: Level, msg: &str) {
-        if let Some(client) = self.clients.get(&origin.from)
-            && client.verbosity.wants(level)
-        {
-            client.send(self.covered(messages::status(level, msg, origin.id.as_ref())));
-        }
-    }
-
-    /// The frame with the memory permit of the long frame from which it was made.
-    pub(super) fn covered(&self, frame: Bytes) -> Bytes {
-        cover(self.permit.as_ref(), frame)
     }
 }

@@ -25,6 +25,8 @@ use crate::protocol::messages::scene::{TfMessage, seen_from};
 use crate::protocol::messages::{Empty, Header, Stamp};
 use crate::protocol::op::GoalStatus;
 
+pub use self::wire::attach;
+
 /// Most requests of one connection. The oldest one ends when another arrives.
 pub const MAX_FRAME_SUBSCRIPTIONS: usize = 4;
 /// Most frames of one request.

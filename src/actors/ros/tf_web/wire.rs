@@ -23,31 +23,29 @@ const RATE: f64 = 10.0;
 /// Least rate in messages per second. A lower rate is raised to this.
 const LEAST_RATE: f64 = 0.1;
 
-impl<const N: usize> TfRepublisher<N> {
-    /// Adds this node's service, action and topics to the registry's table.
-    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        nodes.serve::<RepublishTfs>(Service::RepublishTfs, address.clone());
-        nodes.serve_action::<FrameGoal<N>, _>(address.clone());
-        let start = |(id, goal), message: TopicMessage| {
-            let listening = message.listening;
-            let published = Some(PublishedGoal { id, listening });
-            let client = ActionClient {
-                link: message.link,
-                action: Action::TfSubscription.name().into(),
-                id: message.id,
-                wants_feedback: false,
-            };
-            let (goal, working) = (FrameGoal { published, ..goal }, message.working);
-            ForwardGoal {
-                goal,
-                client,
-                working,
-            }
+/// Adds the node's service, action and topics to the registry's table.
+pub fn attach<const N: usize>(address: &Addr<TfRepublisher<N>>, nodes: &mut Nodes) {
+    nodes.serve::<RepublishTfs>(Service::RepublishTfs, address.clone());
+    nodes.serve_action::<FrameGoal<N>, _>(address.clone());
+    let start = |(id, goal), message: TopicMessage| {
+        let listening = message.listening;
+        let published = Some(PublishedGoal { id, listening });
+        let client = ActionClient {
+            link: message.link,
+            action: Action::TfSubscription.name().into(),
+            id: message.id,
+            wants_feedback: false,
         };
-        nodes.subscribe(Topic::TfWebGoal, address.clone(), read_goal::<N>, start);
-        let cancel = |id, _| CancelPublished(id);
-        nodes.subscribe(Topic::TfWebCancel, address.clone(), read_cancel, cancel);
-    }
+        let (goal, working) = (FrameGoal { published, ..goal }, message.working);
+        ForwardGoal {
+            goal,
+            client,
+            working,
+        }
+    };
+    nodes.subscribe(Topic::TfWebGoal, address.clone(), read_goal::<N>, start);
+    let cancel = |id, _| CancelPublished(id);
+    nodes.subscribe(Topic::TfWebCancel, address.clone(), read_cancel, cancel);
 }
 
 // ---- the service ----------------------------------------------------------------------------------------------------

@@ -1,26 +1,28 @@
-//! Advertisements and subscriptions of clients, the tap of the recorder, and published messages: to the subscribers of
-//! their topic, and to the node that subscribes to it. A message is encoded once for each spelling of its topic and each
-//! requested encoding. `actors/graph/forms.rs` encodes.
+//! Advertisements and subscriptions of clients, and published messages: to the subscribers of their topic. A message is
+//! encoded once for each spelling of its topic and each requested encoding. `actors/graph/forms.rs` encodes.
 //!
 //! **Invariant:** the node that publishes a topic is notified of its first subscriber and of the end of its last one.
-//! Without subscribers nothing is encoded. Subscribers that requested the same encoding share the same bytes. A long
-//! message is encoded on a worker thread and delays only its publisher.
+//! Without subscribers nothing is encoded. Subscribers that requested the same encoding share the same bytes.
 
+use std::collections::HashMap;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 
 use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::{FrameOrigin, Registry, Subscriber, ToClient};
+use super::clients::{Clients, FrameOrigin};
+use super::messages::ToClient;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::MAX_LONG_FORMS;
 use crate::actors::graph::forms::{Made, ToEncode};
 use crate::actors::graph::refusal::{self, Refusal};
-use crate::actors::graph::subscribers::Subscription;
-use crate::actors::node::{Completion, Interest, Publish, SetTap, Tapped, TopicMessage, Working};
-use crate::actors::resources::long_work::{WorkKind, run_long_work};
-use crate::actors::resources::memory::cover_message;
+use crate::actors::graph::subscribers::{self, Subscription};
+use crate::actors::graph::topics::Topics;
+use crate::actors::node::{Interest, Publish, Tap, Tapped};
+use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::memory::{Permit, cover_message};
 use crate::protocol::catalog::{Topic, types};
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::messages::{self, Level};
@@ -30,18 +32,37 @@ use crate::protocol::outbox::Throttle;
 use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::series::Series;
 
-impl Registry {
+/// The topics with their publishers and subscribers.
+#[derive(Default)]
+pub(super) struct Broker {
+    pub(super) topics: Topics<Recipient<ToClient>>,
+    /// The last message of each latched topic that has subscribers.
+    latched: HashMap<Topic, Bytes>,
+    /// Number of messages sent in fragments. It is part of the fragments' ids.
+    fragmented: Arc<AtomicU64>,
+    /// The node that publishes each of the runtime's topics.
+    pub(super) owners: HashMap<Topic, Recipient<Interest>>,
+    /// Passes messages and calls to the recorder, while it records.
+    tap: Option<Tap>,
+    pub(super) gauges: Arc<Gauges>,
+}
+
+/// A subscriber, with the mailbox of its connection.
+type Subscriber = subscribers::Subscriber<Recipient<ToClient>>;
+
+impl Broker {
     // ---- advertisements and subscriptions ---------------------------------------------------------------------------
 
     pub(super) fn advertise(
         &mut self,
+        clients: &mut Clients,
         origin: &FrameOrigin,
         topic: &str,
         type_name: Option<&str>,
     ) -> Result<(), Refusal> {
         let own = refusal::check_published(topic)?;
         let topic = &*names::absolute(topic);
-        let Some(client) = self.clients.get_mut(&origin.from) else {
+        let Some(client) = clients.get_mut(origin.from) else {
             return Ok(());
         };
         let before = client.registered.advertised.get(topic);
@@ -60,8 +81,8 @@ impl Registry {
         Ok(())
     }
 
-    pub(super) fn unadvertise(&mut self, origin: &FrameOrigin, topic: &str) {
-        let Some(client) = self.clients.get_mut(&origin.from) else {
+    pub(super) fn unadvertise(&mut self, clients: &mut Clients, origin: &FrameOrigin, topic: &str) {
+        let Some(client) = clients.get_mut(origin.from) else {
             return;
         };
         let topic = &*names::absolute(topic);
@@ -75,6 +96,7 @@ impl Registry {
 
     pub(super) fn subscribe(
         &mut self,
+        clients: &mut Clients,
         origin: &FrameOrigin,
         subscribe: &Subscribe,
     ) -> Result<(), Refusal> {
@@ -87,10 +109,10 @@ impl Registry {
             return Err(Refusal::UnknownType);
         }
         let is_first = !self.is_wanted(&names::absolute(topic));
-        let is_new = self.add_subscription(origin, subscribe)?;
+        let is_new = self.add_subscription(clients, origin, subscribe)?;
         // Sent first, so that the client gets the status before the first message.
         let msg = format!("subscribed to {topic}");
-        self.send_status(origin, Level::Info, &msg);
+        clients.send_status(origin, Level::Info, &msg);
         if is_first {
             self.notify_owner(topic, true);
         } else if is_new {
@@ -102,6 +124,7 @@ impl Registry {
     /// Adds a subscription, or replaces the one with its id. Returns whether it is new.
     fn add_subscription(
         &mut self,
+        clients: &mut Clients,
         origin: &FrameOrigin,
         subscribe: &Subscribe,
     ) -> Result<bool, Refusal> {
@@ -110,7 +133,7 @@ impl Registry {
         let absolute = names::absolute(topic);
         let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
         let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
-        let Some(client) = self.clients.get_mut(&origin.from) else {
+        let Some(client) = clients.get_mut(origin.from) else {
             return Ok(false);
         };
         let known = self.topics.subscriber(&absolute, topic, origin.from);
@@ -143,7 +166,7 @@ impl Registry {
         Ok(is_new)
     }
 
-    pub(super) fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
+    pub(super) fn unsubscribe(&mut self, clients: &mut Clients, origin: &FrameOrigin, topic: &str) {
         let absolute = names::absolute(topic);
         let subscriber = self.topics.subscriber(&absolute, topic, origin.from);
         let Some(subscriber) = subscriber else {
@@ -154,10 +177,10 @@ impl Registry {
         let throttle = subscriber.throttle();
         configure(subscriber, throttle);
         if throttle.is_none() {
-            if let Some(client) = self.clients.get_mut(&origin.from) {
+            if let Some(client) = clients.get_mut(origin.from) {
                 client.registered.subscribed.remove(topic);
             }
-            self.drop_subscriber(topic, origin.from);
+            self.drop_subscriber(clients, topic, origin.from);
         }
     }
 
@@ -176,17 +199,22 @@ impl Registry {
 
     fn notify_owner(&self, topic: &str, wanted: bool) {
         if let Some(topic) = Topic::from_name(topic)
-            && let Some(owner) = self.nodes.publishers.get(&topic)
+            && let Some(owner) = self.owners.get(&topic)
         {
             owner.do_send(Interest { topic, wanted });
         }
     }
 
     /// Removes a subscriber from a topic, and notifies the topic's owner if it was the last one.
-    pub(super) fn drop_subscriber(&mut self, topic: &str, connection: ConnectionId) {
+    pub(super) fn drop_subscriber(
+        &mut self,
+        clients: &mut Clients,
+        topic: &str,
+        connection: ConnectionId,
+    ) {
         let name = names::absolute(topic);
         self.topics.remove_subscriber(&name, topic, connection);
-        if let Some(client) = self.clients.get_mut(&connection)
+        if let Some(client) = clients.get_mut(connection)
             && Topic::from_name(&name) == Some(Topic::TfWebFeedback)
             && !names::spellings(&name).any(|one| client.registered.subscribed.contains(one))
         {
@@ -199,71 +227,55 @@ impl Registry {
 
     // ---- messages ---------------------------------------------------------------------------------------------------
 
-    /// Delivers a client's message to the topic's subscribers, and to the runtime's own subscriber if there is one.
-    pub(super) fn publish(
-        &mut self,
-        origin: FrameOrigin,
-        topic: &str,
-        msg: Payload,
-        ctx: &mut Context<Self>,
-    ) -> Completion {
-        let own = match refusal::check_published(topic) {
-            Ok(own) => own,
-            Err(why) => {
-                self.refuse(&origin, &why);
-                return Completion::at_once();
-            }
-        };
-        let topic = &*names::absolute(topic);
-        let Some(client) = self.clients.get(&origin.from) else {
-            return Completion::at_once();
-        };
-        let node = own
-            .filter(|topic| !client.withdrawn.contains(topic))
-            .and_then(|topic| Some((topic, self.nodes.subscribers.get(&topic)?)));
-        if node.is_none() && !client.registered.advertised.contains_key(topic) {
-            return Completion::at_once();
+    /// Delivers a message of a node. Stores it if its topic is latched. Messages that it outdates are discarded even
+    /// if nobody subscribes to it, because an answer may follow.
+    pub(super) fn publish(&mut self, Publish { topic, frame }: Publish) {
+        let name = topic.name();
+        let outdated = topic.supersedes().iter();
+        for subscriber in outdated.flat_map(|one| self.topics.subscribers(one)) {
+            discard_held(subscriber);
         }
-        let encode = |spelling: &str| messages::publish_raw(spelling, &msg);
-        let long = self.fan_out(topic, encode);
-        let Some((topic, node)) = node else {
-            return self.finish_delivery(long, ctx);
-        };
-        let (working, completion) = Completion::pending();
-        self.encode_on_worker(long, &working, ctx);
-        if let Some(tap) = &mut self.tap {
-            let frame = messages::publish_raw(topic.name(), &msg);
-            tap(Tapped::Published(topic, &frame));
+        if !self.is_wanted(name) {
+            return;
         }
-        node(TopicMessage {
-            msg,
-            link: client.link.clone(),
-            listening: Arc::downgrade(&client.listening),
-            id: origin.id,
-            working,
-        });
-        completion
+        let frame = frame();
+        self.show_tap(|tap| tap(Tapped::Published(topic, &frame)));
+        let encode = |spelling: &str| messages::respelled(name, spelling, &frame);
+        // A node cannot wait, and its messages are short.
+        for message in self.fan_out(name, None, encode) {
+            self.deliver_made(&message, &message.make());
+        }
+        if topic.is_latched() {
+            self.latched.insert(topic, frame);
+        }
     }
 
-    /// Delivers messages of a client unchanged, if it advertises the topic.
+    /// Delivers messages of a client unchanged, if it advertises the topic. Returns the long ones that are still to be
+    /// encoded.
     pub(super) fn publish_lines(
         &self,
+        clients: &Clients,
         from: ConnectionId,
         lines: &Series,
-        ctx: &mut Context<Self>,
-    ) -> Completion {
+    ) -> Vec<ToEncode> {
         let topic = &*lines.topic;
-        let client = self.clients.get(&from);
+        let client = clients.get(from);
         if client.is_none_or(|client| !client.registered.advertised.contains_key(topic)) {
-            return Completion::at_once();
+            return Vec::new();
         }
         let encode = |spelling: &str| messages::respelled(topic, spelling, &lines.frames);
-        self.finish_delivery(self.fan_out(topic, encode), ctx)
+        self.fan_out(topic, clients.permit.as_ref(), encode)
     }
 
     /// Delivers a message, or a series of messages, to every subscriber of `topic`, an absolute name, in all spellings.
-    /// `encode` makes the JSON for a spelling. Returns the long messages that are still to be encoded in other forms.
-    fn fan_out(&self, topic: &str, encode: impl Fn(&str) -> Bytes) -> Vec<ToEncode> {
+    /// `encode` makes the JSON for a spelling. All forms share the `permit` of a long frame. Returns the long messages
+    /// that are still to be encoded in other forms.
+    pub(super) fn fan_out(
+        &self,
+        topic: &str,
+        permit: Option<&Permit>,
+        encode: impl Fn(&str) -> Bytes,
+    ) -> Vec<ToEncode> {
         let now = Instant::now();
         let mut plain: Vec<(&str, Bytes)> = Vec::new();
         let mut others: Vec<ToEncode> = Vec::new();
@@ -273,7 +285,7 @@ impl Registry {
             let frame = match known {
                 Some((_, frame)) => frame.clone(),
                 None => {
-                    let frame = cover_message(self.permit.as_ref(), encode(spelling));
+                    let frame = cover_message(permit, encode(spelling));
                     plain.push((spelling, frame.clone()));
                     frame
                 }
@@ -286,7 +298,7 @@ impl Registry {
             } else if frame.len() > MEDIUM && plain.len() + others.len() >= MAX_LONG_FORMS {
                 self.gauges.add_dropped(1);
             } else {
-                others.push(self.to_encode(subscriber, frame));
+                others.push(self.to_encode(subscriber, frame, permit));
             }
         }
         let (long, short) = others.into_iter().partition(ToEncode::is_long);
@@ -296,20 +308,13 @@ impl Registry {
         long
     }
 
-    /// Ends the delivery of a client's message. The client waits for the encoding of a long one.
-    fn finish_delivery(&self, long: Vec<ToEncode>, ctx: &mut Context<Self>) -> Completion {
-        if long.is_empty() {
-            return Completion::at_once();
-        }
-        let (working, completion) = Completion::pending();
-        self.encode_on_worker(long, &working, ctx);
-        completion
-    }
-
-    // ---- forms of a message -----------------------------------------------------------------------------------------
-
     /// A JSON frame, or a series of frames, to encode in the form that the subscriber requested.
-    fn to_encode(&self, subscriber: &Subscriber, plain: Bytes) -> ToEncode {
+    fn to_encode(
+        &self,
+        subscriber: &Subscriber,
+        plain: Bytes,
+        permit: Option<&Permit>,
+    ) -> ToEncode {
         ToEncode {
             spelling: Arc::clone(&subscriber.spelling),
             plain,
@@ -317,30 +322,13 @@ impl Registry {
             recipients: vec![Arc::clone(&subscriber.spelling)],
             type_name: self.topics.known_type(&subscriber.spelling),
             fragmented: Arc::clone(&self.fragmented),
-            permit: self.permit.clone(),
-        }
-    }
-
-    /// Encodes long messages on worker threads, and delivers them.
-    fn encode_on_worker(&self, long: Vec<ToEncode>, working: &Working, ctx: &mut Context<Self>) {
-        for message in long {
-            let working = working.clone();
-            let kind = WorkKind::of(message.plain.len());
-            let count = message.recipients.len() as u64;
-            let making = run_long_work(kind, move || (message.make(), message));
-            ctx.spawn(making.into_actor(self).map(move |made, registry, _| {
-                match made {
-                    Some((made, message)) => registry.deliver_made(&message, &made),
-                    None => registry.gauges.add_dropped(count),
-                }
-                drop(working);
-            }));
+            permit: permit.cloned(),
         }
     }
 
     /// Delivers a message in one form to its recipients that are still subscribed, even if they have requested another
     /// form since.
-    fn deliver_made(&self, message: &ToEncode, made: &Made) {
+    pub(super) fn deliver_made(&self, message: &ToEncode, made: &Made) {
         let topic = names::absolute(&message.spelling);
         // Both lists have the same order.
         let mut left = self.topics.subscribers(&topic).iter();
@@ -375,48 +363,20 @@ impl Registry {
             if subscriber.encoding.keeps(plain.len()) {
                 return deliver(subscriber, plain, Instant::now());
             }
-            let message = self.to_encode(subscriber, plain);
+            let message = self.to_encode(subscriber, plain, None);
             self.deliver_form(subscriber, &message.make());
         }
     }
-}
 
-impl Handler<Publish> for Registry {
-    type Result = ();
+    // ---- the recorder -----------------------------------------------------------------------------------------------
 
-    /// Delivers a message of a node. Stores it if its topic is latched. Messages that it outdates are discarded even
-    /// if nobody subscribes to it, because an answer may follow.
-    fn handle(&mut self, Publish { topic, frame }: Publish, _: &mut Context<Self>) {
-        let name = topic.name();
-        for subscriber in topic
-            .supersedes()
-            .iter()
-            .flat_map(|one| self.topics.subscribers(one))
-        {
-            discard_held(subscriber);
-        }
-        if !self.is_wanted(name) {
-            return;
-        }
-        let frame = frame();
-        if let Some(tap) = &mut self.tap {
-            tap(Tapped::Published(topic, &frame));
-        }
-        let encode = |spelling: &str| messages::respelled(name, spelling, &frame);
-        // A node cannot wait, and its messages are short.
-        for message in self.fan_out(name, encode) {
-            self.deliver_made(&message, &message.make());
-        }
-        if topic.is_latched() {
-            self.latched.insert(topic, frame);
-        }
+    /// Shows a message or a call to the tap, if there is one.
+    pub(super) fn show_tap(&mut self, show: impl FnOnce(&mut Tap)) {
+        self.tap.as_mut().map(show);
     }
-}
 
-impl Handler<SetTap> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, SetTap(tap): SetTap, _: &mut Context<Self>) {
+    /// Sets or removes the tap. It gets the latched messages first.
+    pub(super) fn set_tap(&mut self, tap: Option<Tap>) {
         let was_set = self.tap.is_some();
         self.tap = tap;
         for topic in Topic::ALL {
