@@ -20,10 +20,8 @@ import { exact } from "./format.js";
  * @property {{position?: number[], velocity?: number[]} | null} [start] the start of the arm [rad, rad/s]; only in links
  */
 
-/** Changes that can be undone. */
-const MOST_STEPS = 100;
-/** Changes within this time count as one, because a slider passes through many values [ms]. */
-const ONE_CHANGE_MS = 1000;
+const MOST_STEPS = 100; // changes that can be undone
+const ONE_CHANGE_MS = 1000; // changes within this time count as one, because a slider passes through many values [ms]
 
 /** The runtime's default settings, by number of links. A test compares them with the runtime. @type {Record<number, Settings>} */
 export const DEFAULTS = {
@@ -122,11 +120,8 @@ function isSame(/** @type {Settings} */ one, /** @type {Settings | null} */ othe
 
 /** The settings before each change, the newest last. */
 export class Undo {
-  constructor() {
-    /** @type {Settings[]} */
-    this.past = [];
-    this.lastTime = -Infinity;
-  }
+  past = /** @type {Settings[]} */ ([]);
+  lastTime = -Infinity;
 
   /** Stores the present settings before a change at `now` [ms], unless the change continues the previous one. */
   remember(/** @type {Settings | null} */ present, /** @type {number} */ now) {
@@ -145,8 +140,7 @@ export class Undo {
   /** The settings to restore; undefined if there are none. */
   take(/** @type {Settings | null} */ present) {
     this.lastTime = -Infinity;
-    let settings = this.past.pop();
-    while (settings && isSame(settings, present)) settings = this.past.pop();
-    return settings;
+    while (this.past.length > 0 && isSame(this.past[this.past.length - 1], present)) this.past.pop();
+    return this.past.pop();
   }
 }
