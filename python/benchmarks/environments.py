@@ -1,11 +1,13 @@
-"""Steps per second, compared with Acrobot and MuJoCo, in one run on one core: environments.py [seconds per row].
+"""Steps per second, compared with Acrobot and MuJoCo, in one run on one core: environments.py [seconds per row [rows]].
 
 It needs gymnasium and mujoco besides the wheel (`requirements.txt` in this folder). Every row is measured in turn, in
 three rounds, and the best round counts. The unit is processor time of this process, which other programs disturb less
 than clock time. A step of Acrobot is one of Runge-Kutta 4 over 0.2 s in Python. A step of pendularm and of MuJoCo is
-two over 0.025 s.
+two over 0.025 s, except in the row `step(1, effort)`, where it is one. `rows` is a part of the rows' names, such as
+`Batch`; other rows are left out.
 """
 
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -61,18 +63,22 @@ def many(name: str) -> gymnasium.vector.VectorEnv:
     return gymnasium.make_vec(name, ARMS, threads=1, timestep=0.025)
 
 
-def batch() -> Callable[[], int]:
-    """Only the library, without observations and rewards."""
+def batch(take: Callable[[pendularm.Batch, np.ndarray], None]) -> Callable[[], int]:
+    """Only the library, without observations and rewards: `take` takes a step with an effort per joint."""
     arms = pendularm.Batch(ARMS, threads=1)
     arms.set_integrator(timestep=0.025)
     effort = np.random.default_rng(0).uniform(-1, 1, (ARMS, 2))
 
     def run() -> int:
-        arms.disturb(effort, 2 * 0.025)
-        arms.step(2)
+        take(arms, effort)
         return ARMS
 
     return run
+
+
+def disturbed(arms: pendularm.Batch, effort: np.ndarray) -> None:
+    arms.disturb(effort, 2 * 0.025)
+    arms.step(2)
 
 
 def mujoco_step() -> Callable[[], int]:
@@ -115,7 +121,7 @@ def check() -> None:
 
 def main() -> None:
     check()
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 1.0
+    seconds, wanted = float(sys.argv[1]) if len(sys.argv) > 1 else 1.0, " ".join(sys.argv[2:])
     rows = {
         "Acrobot-v1": single(gymnasium.make("Acrobot-v1")),
         "Acrobot-v1, 8 in a SyncVectorEnv": vector(gymnasium.make_vec("Acrobot-v1", 8, vectorization_mode="sync")),
@@ -124,8 +130,11 @@ def main() -> None:
         "Pendularm-v0": single(gymnasium.make("Pendularm-v0", timestep=0.025)),
         f"Pendularm-v0, {ARMS} in its vector environment": vector(many("Pendularm-v0")),
         f"PendularmReach-v0, {ARMS} likewise": vector(many("PendularmReach-v0")),
-        f"pendularm.Batch of {ARMS}": batch(),
+        f"pendularm.Batch of {ARMS}": batch(disturbed),
+        f"pendularm.Batch of {ARMS}, step(1, effort)": batch(lambda arms, effort: arms.step(1, effort)),
     }
+    rows = {name: run for name, run in rows.items() if wanted in name or name == "Acrobot-v1"}
+    print(f"load {os.getloadavg()[0]:.1f}")
     best = dict.fromkeys(rows, 0.0)
     for _ in range(ROUNDS):
         for name, run in rows.items():

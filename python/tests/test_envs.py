@@ -96,6 +96,8 @@ def test_without_automatic_resets_the_caller_resets(name):
     assert env.step(np.zeros((3, 2), np.float32))[3].tolist() == [False, True, False]
     with pytest.raises(ValueError, match="^autoreset_mode must be one of NextStep, SameStep, Disabled, got 'never'"):
         gymnasium.make_vec(name, 3, autoreset_mode="never")
+    with pytest.raises(TypeError, match="^autoreset_mode must be one of NextStep, SameStep, Disabled, got 1$"):
+        gymnasium.make_vec(name, 3, autoreset_mode=1)
 
 
 def by_state(env):

@@ -4,6 +4,7 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pendularm
 import pytest
 from pendularm._page import SETTINGS
@@ -23,7 +24,7 @@ class Frame(HTMLParser):
 
 
 def test_a_cell_shows_the_whole_page_at_its_step():
-    shown = pendularm.page(4, timestep=0.01, kp=[900, 200], controller=True, height=500)
+    shown = pendularm.page(4, timestep=0.01, kp=np.array([900, 200]), controller=True, height=500)
     frame = Frame(shown._repr_html_()).found
     assert frame["height"] == "500"
     assert frame["srcdoc"] == shown.text

@@ -1,6 +1,7 @@
 """Scores: the wheel, the program and Gymnasium's environments agree, and one changed digit is refused."""
 
 import json
+import os
 import subprocess
 import sysconfig
 from pathlib import Path
@@ -72,6 +73,9 @@ def test_a_thousand_submissions_agree_in_program_and_wheel(tmp_path):
         # Python prints small numbers with another exponent.
         assert float(lines[place].removeprefix(start).removesuffix(": confirmed")) == pendularm.score(one)
     assert min(steps) < 40 < max(steps) == 2000
+    # For the page: `node tests/page/scores.mjs PROGRAM pendularm.html FILE`.
+    if file := os.environ.get("KEEP_SUBMISSIONS"):
+        Path(file).write_text("".join(json.dumps(one) + "\n" for one in submissions), encoding="utf-8")
 
 
 @pytest.mark.parametrize("task", TASKS)

@@ -6,11 +6,15 @@ import html
 import json
 import tempfile
 import webbrowser
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-Setting = float | str | bool | Sequence[float] | None
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._fields import numbers, shown, whole_number
+
+Setting = ArrayLike | None
 
 #: The names of the settings in a link of the page.
 SETTINGS = (
@@ -28,9 +32,10 @@ def _text(name: str, value: Setting) -> str:
     if isinstance(value, str):
         return value
     try:
-        return ",".join(repr(float(one)) for one in value) if isinstance(value, Sequence) else repr(float(value))  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise TypeError(f"{name} must be a number, a text, or a sequence of numbers") from None
+        return ",".join(repr(float(one)) for one in np.atleast_1d(numbers(value)))
+    except (TypeError, ValueError, OverflowError) as why:
+        kind = TypeError if isinstance(why, TypeError) else ValueError
+        raise kind(f"{name} must be a number, a text, or a sequence of numbers, got {shown(value)}") from None
 
 
 @dataclass(frozen=True)
@@ -70,10 +75,13 @@ def page(step: int | str | None = None, *, links: int = 2, height: int = 620, **
     the same names: ``page(method="euler", timestep=0.01, kp=[900, 200], controller=True)``. `True` and `False` are *on* and *off*, and
     `None` is no limit of the effort. The page offers them, applies them after a click on *Apply*, and says what is wrong with them.
 
-    Raises `TypeError` for an unknown setting, and `ValueError` if ``links`` is not 2 or 3.
+    Raises `TypeError` for an unknown setting or a wrong type, and `ValueError` if ``links`` is not 2 or 3.
     """
+    links, height = whole_number("links", links), whole_number("height", height)
     if links not in (2, 3):
-        raise ValueError("links must be 2 or 3")
+        raise ValueError(f"links must be 2 or 3, got {shown(links)}")
+    if not isinstance(step, str | None):
+        step = whole_number("step", step)
     for name in settings:
         if name not in SETTINGS:
             raise TypeError(f"page() has no setting {name!r}; it has {', '.join(SETTINGS)}")

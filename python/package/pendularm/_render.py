@@ -51,7 +51,8 @@ class Renderer:
     def __init__(self, mode: str | None, task: Task) -> None:
         modes = METADATA["render_modes"]
         if mode is not None and not (isinstance(mode, str) and mode in modes):
-            raise ValueError(f"render_mode must be None, {' or '.join(modes)}, got {shown(mode)}")
+            kind = ValueError if isinstance(mode, str) else TypeError
+            raise kind(f"render_mode must be None, {' or '.join(modes)}, got {shown(mode)}")
         self.mode = mode
         self.task = task
         self.canvas: Any = None

@@ -7,9 +7,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from . import dynamics
 from ._fields import Floats, Method, number, shown
-from ._native import Arm, Batch, end_effector
+from ._native import Arm, Batch, end_effector, gravity_load
 
 Observation = NDArray[np.float32]
 Action = NDArray[np.float32]
@@ -61,7 +60,7 @@ class Task:
         self.links = links
         self.reach = arm.reach
         self.lengths = arm.lengths
-        self.efforts = self.strength * dynamics.gravity_load(arm, np.zeros(links))[self.driven]
+        self.efforts = self.strength * gravity_load(arm, np.zeros(links))[self.driven]
         self.action_space = spaces.Box(-1.0, 1.0, self.efforts.shape, np.float32)
         bounds = np.array([1.0] * (2 * links) + [FASTEST] * links + self.further_bounds(), np.float32)
         self.observation_space = spaces.Box(-bounds, bounds, dtype=np.float32)

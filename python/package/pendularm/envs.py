@@ -178,7 +178,8 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
             self._mode = AutoresetMode(autoreset_mode)
         except ValueError:
             modes = ", ".join(mode.value for mode in AutoresetMode)
-            raise ValueError(f"autoreset_mode must be one of {modes}, got {shown(autoreset_mode)}") from None
+            kind = ValueError if isinstance(autoreset_mode, str) else TypeError
+            raise kind(f"autoreset_mode must be one of {modes}, got {shown(autoreset_mode)}") from None
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
         self._picture = Renderer(render_mode, self._task)
         self.num_envs = num_envs
@@ -298,9 +299,10 @@ class _Vector(_States, VectorEnv[Observation, Action, Any]):
 
 
 def sb3(name: str, num_envs: int, **kwargs: Any) -> "Sb3VecEnv":
-    """The environment `name` with `num_envs` arms as a `VecEnv` of stable-baselines3, which needs this package.
+    """The environment `name` with `num_envs` arms as a `VecEnv` of stable-baselines3, which must be installed.
 
-    `kwargs` are those of the vector environment, such as `links`, `threads` or `render_mode`.
+    `kwargs` are those of the vector environment: `links`, `threads`, `max_episode_steps`, `method`, `timestep` and
+    `render_mode`. An arm is reset in the step of its end.
     """
     from .sb3 import Sb3VecEnv
 

@@ -5,9 +5,8 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
-from . import _native
-from ._fields import Floats, Method, made, shown, whole_number
-from ._native import as_doubles, is_masked
+from ._fields import Floats, Method, made, number, shown, whole_number
+from ._native import as_doubles, held_limit as _held_limit, is_masked
 
 __all__ = ["HeldLimit", "HeldMode", "held_limit"]
 
@@ -59,8 +58,6 @@ class HeldLimit:
 
 
 def _rows(name: str, value: Any) -> list[list[float]]:
-    if value is None:
-        return []
     try:
         if is_masked(value):
             raise ValueError
@@ -77,8 +74,7 @@ def _rows(name: str, value: Any) -> list[list[float]]:
 def _time(name: str, value: Any) -> float | None:
     if value is None:
         return None
-    rows = [] if isinstance(value, bool) else _rows(name, value)
-    time = rows[0][0] if [len(row) for row in rows] == [1] else 0.0
+    time = number(name, value)
     if not 0.0 < time < float("inf"):
         raise ValueError(f"{name} must be finite and greater than 0, got {shown(value)}")
     return time
@@ -117,13 +113,14 @@ def held_limit(
         if count < 1 or abs(count * step - length) > 1e-6 * length:
             raise ValueError(f"period must be a whole number of timesteps, got {shown(period)} and {shown(timestep)}")
     numbers = {"delay": whole_number("delay", delay), "steps": count}
-    for name, number in numbers.items():
-        if not 0 <= number < 2**63:
-            raise ValueError(f"{name} must be at least 0, got {shown(number)}")
+    for name, given in numbers.items():
+        if not 0 <= given < 2**63:
+            raise ValueError(f"{name} must be at least 0 and less than 2^63, got {shown(given)}")
     if not isinstance(between, str):
         raise TypeError(f"between must be a name, got {shown(between)}")
-    matrices = {"M": M, "kp": kp, "kd": kd, "ki": ki, "damping": damping, "stiffness": stiffness}
-    arguments: dict[str, Any] = {name: _rows(name, value) for name, value in matrices.items()}
-    answer = _native.held_limit(arguments | numbers | {"period": length, "between": between})
+    matrices = {"kp": kp, "kd": kd, "ki": ki, "damping": damping, "stiffness": stiffness}
+    arguments: dict[str, Any] = {"M": _rows("M", M)}
+    arguments |= {name: [] if value is None else _rows(name, value) for name, value in matrices.items()}
+    answer = _held_limit(arguments | numbers | {"period": length, "between": between})
     critical = answer["critical"]
     return made(HeldLimit, answer | {"critical": None if critical is None else made(HeldMode, critical)})

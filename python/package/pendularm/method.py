@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _native
 from ._fields import Floats, made, shown
-from ._native import Arm, is_masked, is_too_long
+from ._native import Arm, amplification, analyse_method, is_masked, is_too_long, tableau as _checked
 from .study import SuggestedGains
 
 __all__ = ["Method", "MethodAnalysis"]
@@ -115,7 +114,7 @@ class Method:
         self._set(tableau | {name: _row(name, value) for name, value in lists.items()})
 
     def _set(self, tableau: dict[str, Any]) -> None:
-        self.stages, self.evaluations = _native.tableau(tableau)
+        self.stages, self.evaluations = _checked(tableau)
         self._tableau = tableau
 
     @classmethod
@@ -140,7 +139,7 @@ class Method:
         `gains`, `setpoint` [rad] and `control_period` [s] are those of `stability`.
         """
         loop = {"arm": arm, "gains": gains, "setpoint": setpoint, "control_period": control_period}
-        return made(MethodAnalysis, _native.analyse_method(loop | {"tableau": self._tableau}))
+        return made(MethodAnalysis, analyse_method(loop | {"tableau": self._tableau}))
 
     def amplification(self, z: Any) -> Floats:
         """The factor of a mode in a step, for each `z`: its eigenvalue times the timestep. It has the shape of `z`.
@@ -150,8 +149,12 @@ class Method:
         try:
             if is_too_long(z) or is_masked(z):
                 raise ValueError
-            points = np.asarray(z, dtype=complex)
-        except (TypeError, ValueError, OverflowError):
-            raise ValueError(f"z must be an array of numbers, got {shown(z)}") from None
-        factors = _native.amplification(self._tableau, points.real.ravel().tolist(), points.imag.ravel().tolist())
+            points = np.asarray(z)
+            if points.dtype.kind not in "iufc":
+                raise TypeError
+            points = points.astype(complex)
+        except (TypeError, ValueError, OverflowError) as why:
+            kind = TypeError if isinstance(why, TypeError) else ValueError
+            raise kind(f"z must be an array of numbers, got {shown(z)}") from None
+        factors = amplification(self._tableau, points.real.ravel().tolist(), points.imag.ravel().tolist())
         return np.array(factors).reshape(points.shape)

@@ -129,6 +129,8 @@ def _task(name: str) -> "Task":
     """One arm with a task."""
     from ._tasks import TASKS, TIMESTEP
 
+    if not isinstance(name, str):
+        raise TypeError(f"task must be a text, got {shown(name)}")
     tasks = {f"{name}-v0": task for name, task in TASKS.items()}
     if name not in tasks:
         raise ValueError(f"no task {name!r}")

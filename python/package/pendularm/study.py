@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _native
 from ._fields import AntiWindup, Floats, Method, OwnMethod, VelocitySource, made, number, present_name, renamed, shown
 from ._native import Arm, Simulation, as_doubles
+from ._native import plan as _plan, rollout as _rollout, stability as _stability, suggest_gains as _suggest_gains
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -249,7 +249,7 @@ def suggest_gains(
     moves must settle within `settling_time` [s]. `robot` has the motors and sensors, as `Simulation` takes them. Raises
     `ValueError` if there are no such gains.
     """
-    return made(SuggestedGains, _native.suggest_gains(_arguments(locals())))
+    return made(SuggestedGains, _suggest_gains(_arguments(locals())))
 
 
 @renamed
@@ -271,7 +271,7 @@ def stability(
     [rad] and `qd` [rad/s] are the state at the start of the coming motion. `robot` has control period, delay, motors and
     sensors, as `Simulation` takes them.
     """
-    found = _native.stability(_arguments(locals()))
+    found = _stability(_arguments(locals()))
     critical = found["critical"]
     return made(Stability, {**found, "critical": None if critical is None else made(Critical, critical)})
 
@@ -323,7 +323,7 @@ def rollout(
             if given["tableau"] is not None:
                 raise TypeError("effort must be an array with a Method")
             given["effort"] = _played(effort, given)
-    return made(Rollout, _native.rollout(given))
+    return made(Rollout, _rollout(given))
 
 
 def _played(effort: Callable[[float, Floats, Floats], ArrayLike], given: Mapping[str, Any]) -> list[Floats]:
@@ -368,7 +368,7 @@ def plan(
     given["tableau"] = _tableau(method)
     if method is not None and given["tableau"] is None:
         raise TypeError(f"method must be a Method, got {shown(method)}")
-    found = _native.plan(given)
+    found = _plan(given)
     own = found.pop("own")
     assert own is None or isinstance(own, tuple)
     return made(Plan, {**found, "own": own and OwnPlan(*own)})

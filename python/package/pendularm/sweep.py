@@ -203,8 +203,8 @@ def sweep(
     if metric not in METRICS if isinstance(metric, str) else not callable(metric):
         kind = ValueError if isinstance(metric, str) else TypeError
         raise kind(f"metric must be one of {', '.join(METRICS)} or a function, got {metric!r}")
-    if executor is not None and not callable(getattr(executor, "submit", None)):
-        raise TypeError(f"executor must have submit, as in concurrent.futures, got {shown(executor)}")
+    if isinstance(executor, type) or (executor is not None and not callable(getattr(executor, "submit", None))):
+        raise TypeError(f"executor must be an object with submit, as in concurrent.futures, got {shown(executor)}")
     folder = None if folder is None else path("folder", folder)
     progress = flag("progress", progress)
     columns = {name: column(name, values, links) for name, values in axes.items()}

@@ -71,11 +71,15 @@ fn one_or_each_whole<T>(
 
 /// The refusal of `value`, because of itself or its entry `reason`.
 fn not_one_or_each(reason: &Object<'_>, value: &Object<'_>, arms: usize, expected: &str) -> PyErr {
-    let why = format!(
+    refusal(reason, one_or_each_rule(value, arms, expected))
+}
+
+/// What `value` must be, and what it is.
+fn one_or_each_rule(value: &Object<'_>, arms: usize, expected: &str) -> String {
+    format!(
         "{expected}, or one for each of {arms} arms, got {}",
         shown(value)
-    );
-    refusal(reason, why)
+    )
 }
 
 /// The refusal of an argument because of itself or one of its entries: a `ValueError` for a number out of range and a
@@ -109,12 +113,18 @@ pub(super) fn read_names<T>(
     arms: usize,
     choose: impl Fn(Name) -> PyResult<T>,
 ) -> PyResult<Option<Vec<T>>> {
-    let read = |one: &Object<'_>| {
-        let name = one.extract::<String>().ok();
-        name.map(|name| choose(Name::Is(name))).transpose()
-    };
     let expected = format!("{field} must be a name");
-    let all = |value: &Object<'_>| one_or_each(value, arms, &expected, read);
+    let all = |value: &Object<'_>| {
+        let read = |one: &Object<'_>| match one.extract::<String>() {
+            Ok(name) => choose(Name::Is(name)).map(Some),
+            // A number has a wrong type here, and is not out of range.
+            Err(_) if one.is_instance_of::<PyInt>() => {
+                Err(wrong_type(one_or_each_rule(value, arms, &expected)))
+            }
+            Err(_) => Ok(None),
+        };
+        one_or_each(value, arms, &expected, read)
+    };
     value.map(all).transpose()
 }
 

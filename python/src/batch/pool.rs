@@ -17,6 +17,9 @@ static POOLS: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
 /// The number of pools that are kept, the last used ones. Others end with their call.
 const MOST_KEPT: usize = 4;
 
+/// Bytes of a thread's stack, as the main thread has them. A build without optimisation needs more than the usual 2 MiB.
+const STACK: usize = 8 << 20;
+
 /// The threads that share the work, or fewer if the system refuses some; `None` for one thread.
 pub(super) fn pool(threads: usize) -> Option<Arc<ThreadPool>> {
     if threads == 1 {
@@ -46,7 +49,9 @@ pub(super) fn pool(threads: usize) -> Option<Arc<ThreadPool>> {
 fn started(threads: usize) -> Option<Arc<ThreadPool>> {
     let fewer = iter::successors(Some(threads), |count| Some(count / 2));
     fewer.take_while(|&count| count > 1).find_map(|count| {
-        let pool = ThreadPoolBuilder::new().num_threads(count).build();
-        pool.ok().map(Arc::new)
+        let threads = ThreadPoolBuilder::new()
+            .num_threads(count)
+            .stack_size(STACK);
+        threads.build().ok().map(Arc::new)
     })
 }
