@@ -3,9 +3,9 @@
 
 import { announce, byId, passFocus, warn } from "./dom.js";
 import { inPageNames } from "./format.js";
-import { change, enable, GROUPS, pause, reset, sendSetpoint, setIntegrator, setState } from "./runtime.js";
+import { change, enable, GROUPS, pause, reset, sendSetpoint, setState } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
-import { state, tell, watch } from "./store.js";
+import { known, settingsKnown, state, tell, watch } from "./store.js";
 
 const undo = new Undo();
 let applying = false;
@@ -25,8 +25,10 @@ function showUndo() {
 export function startActions() {
   byId("undo").addEventListener("click", takeBack);
   byId("defaults").addEventListener("click", async () => {
+    const links = await known(settingsKnown);
+    if (links === null) return warn("not connected");
     remember();
-    report(await apply(DEFAULTS[state.links]), "All settings are the defaults again.");
+    report(await apply(DEFAULTS[links]), "All settings are the defaults again.");
   });
   watch("links", () => {
     undo.past.length = 0;
@@ -42,21 +44,24 @@ function report(refused, done) {
 }
 
 export async function takeBack() {
-  if (byId("undo").disabled) return;
+  // Before its answer the last change is not seen in the settings.
+  await known(settingsKnown);
+  await known(() => state.changing === 0 || null);
+  if (!undo.leadsBackFrom(presentSettings(state))) return announce("There is nothing to undo.");
   const settings = undo.take(presentSettings(state));
   showUndo();
   if (!settings) return;
   report(await apply(settings), "Undone.");
 }
 
-/** Settings that an older server does not have. */
-const LATE = ["friction", "motors", "sensors"];
+const LATE = ["friction", "motors", "sensors"]; // settings that an older server does not have
 
 /**
  * Applies the given settings, and returns the text of all refusals. The controller is last, so it never acts with half of the settings.
  * @param {Partial<import("./settings.js").Settings>} settings
  */
 export async function apply({ controller, setpoint, start, ...groups }) {
+  await known(settingsKnown);
   applying = true;
   tell("anew");
   const answers = [];
@@ -71,18 +76,17 @@ export async function apply({ controller, setpoint, start, ...groups }) {
   return textOf(answers);
 }
 
-/** Sends the setpoint if the runtime will accept it. A message has no answer, so the refusal has the words of the services. @param {number[]} setpoint */
+/** Sends the setpoint if the runtime will accept it. A refusal has the words of the services. @param {number[]} setpoint */
 function setSetpoint(setpoint) {
   const wrong = setpoint.findIndex((angle) => !Number.isFinite(angle));
   const status = setpoint.length !== state.links ? `setpoint must have ${state.links} entries, got ${setpoint.length}` : wrong >= 0
     ? `setpoint[${wrong}] must be a number` : "";
-  if (!status) sendSetpoint(setpoint);
-  return { result: !status, status };
+  return status ? { result: false, status } : sendSetpoint(setpoint);
 }
 
 /** The refusals among these answers, with the page's names. @param {{ result: boolean, status?: string }[]} answers */
 function textOf(answers) {
-  return inPageNames(answers.filter((answer) => !answer.result).map((answer) => answer.status ?? "").join("; "));
+  return inPageNames([...new Set(answers.filter((answer) => !answer.result).map((answer) => answer.status))].join("; "));
 }
 
 /**
@@ -96,7 +100,7 @@ export async function setScene({ controller, setpoint, ...rest }, paused) {
   // A reset changes the setpoint to the starting pose, so the setpoint is sent after it.
   const late = await apply({ controller, setpoint });
   if (state.paused !== paused) await pause(paused);
-  return [early, late, textOf([answer])].filter(Boolean).join("; ");
+  return [...new Set([early, late, textOf([answer])])].filter(Boolean).join("; ");
 }
 
 /** Back to the starting pose. */
@@ -108,7 +112,7 @@ export async function resetArm() {
 
 /** Recovers from a divergence in one click: a smaller timestep, then a reset. Everything else stays, including the setpoint. */
 export async function recover(timestep) {
-  const set = await setIntegrator({ timestep });
+  const set = await change("integrator", { timestep });
   return set.result ? beginAnew() : set;
 }
 

@@ -2,25 +2,21 @@
 // Arrow keys do the same without a pointer.
 // Invariant: while aiming, one request is sent at a time, at a bounded rate, and the last position is always sent.
 
-import { warn } from "./dom.js";
 import { endEffector, rounded, showAim, toWorld } from "./arm_view.js";
-import { goalOptions, showGoalPlace, showGoalRefusal } from "./tasks_panel.js";
+import { cancelTarget, goalOptions, showGoalPlace, showGoalRefusal } from "./tasks_panel.js";
 import { inPageNames } from "./format.js";
 import { latestOnly } from "./latest.js";
 import { nearestInReach, nearestTurn } from "./mechanics.js";
-import { cancelGoal, sendGoal, sendSetpoint, setState, solve } from "./runtime.js";
-import { state } from "./store.js";
+import { sendGoal, sendSetpoint, setState, solve } from "./runtime.js";
+import { known, state, unknown } from "./store.js";
 
 const INTERVAL_MS = 100;
 /** Time between two requests. A lifted arm falls a few millimetres in it [ms]. */
 const LIFT_MS = 20;
 const ARROW_M = 0.05;
-/** The radius that a finger covers [px]. */
-const FINGER_PX = 36;
-/** A finger that moved less counts as a tap [px]. */
-const TAP_PX = 10;
-/** Time after the last arrow key until the position counts as chosen. */
-const SETTLE_MS = 600;
+const FINGER_PX = 36; // the radius that a finger covers [px]
+const TAP_PX = 10; // a finger that moved less counts as a tap [px]
+const SETTLE_MS = 600; // time after the last arrow key until the position counts as chosen
 
 /** @typedef {"goal" | "setpoint" | "arm"} Mode what a drag moves */
 
@@ -42,9 +38,7 @@ const lift = latestOnly(async (place) => {
 function report(place, answer) {
   place.refused = !answer.result;
   place.answered = true;
-  const refusal = answer.result ? "" : inPageNames(answer.status);
-  showGoalRefusal(refusal);
-  if (refusal) warn(refusal);
+  showGoalRefusal(answer.result ? "" : inPageNames(answer.status));
   if (!aim) {
     if (place === lastPlace) finish(place);
   } else if (aim.refused !== place.refused) {
@@ -67,8 +61,7 @@ async function poseAt({ x, y }) {
 
 async function placeSetpoint(place) {
   const { answer, pose } = await poseAt(place);
-  if (answer.result) sendSetpoint(pose);
-  return answer;
+  return answer.result ? sendSetpoint(pose) : answer;
 }
 
 async function putArm(place) {
@@ -82,7 +75,7 @@ async function putArm(place) {
 
 /** @param {{x: number, y: number}} wished @param {Mode} mode */
 function moveTo(wished, mode) {
-  const place = mode === "arm" ? nearestInReach(wished, state.params?.lengths ?? []) : wished;
+  const place = mode === "arm" ? nearestInReach(wished, state.params.lengths) : wished;
   aim = { ...place, phi: mode === "goal" ? goalOptions().phi : undefined, mode, refused: aim?.refused ?? false };
   lastPlace = { ...aim };
   showAim(aim);
@@ -111,23 +104,36 @@ function modeOf(event) {
   return state.view === "course" ? "goal" : /** @type {Mode} */ (chosen.value);
 }
 
+/** The arm's lengths; null until they are known, and with them the place of a pointer in metres. */
+function shape() {
+  return state.links > 0 && state.params?.lengths.length === state.links ? state.params.lengths : null;
+}
+
 /** Whether a touch is on the end effector. */
 function isOnEnd({ clientX, clientY }) {
-  if (state.links === 0) return false;
+  if (!shape()) return false;
   const { x, y } = toWorld({ clientX, clientY });
   const end = endEffector();
   const edge = toWorld({ clientX: clientX + FINGER_PX, clientY }).x - x; // the same way in metres
   return Math.hypot(x - end.x, y - end.y) < edge;
 }
 
+/** A position that was pressed or tapped, chosen once the arm is known. */
+async function choose(event) {
+  if (await known(shape) === null) return showGoalRefusal(unknown().status);
+  moveTo(toWorld(event), modeOf(event));
+  end();
+}
+
 export function startAim(canvas) {
-  // A finger that starts on the end effector drags it. Elsewhere it scrolls the page, and a tap chooses the position.
+  // A finger that starts on the end effector drags it. Elsewhere it scrolls the page, and a tap chooses the position. A drag that starts
+  // before the arm is known chooses the position where it ends.
   let tap = null;
   canvas.addEventListener("touchstart", (event) => { if (isOnEnd(event.touches[0])) event.preventDefault(); }, { passive: false });
   canvas.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0 || state.links === 0) return;
+    if (event.button !== 0) return;
     tap = null;
-    if (event.pointerType === "touch" && !isOnEnd(event)) {
+    if (!shape() || (event.pointerType === "touch" && !isOnEnd(event))) {
       tap = event;
       return;
     }
@@ -139,20 +145,22 @@ export function startAim(canvas) {
     if (event.pointerId === pointer) moveTo(toWorld(event), event.shiftKey ? "setpoint" : aim.mode);
   });
   canvas.addEventListener("pointerup", (event) => {
-    const isTap = tap?.pointerId === event.pointerId && Math.hypot(event.clientX - tap.clientX, event.clientY - tap.clientY) < TAP_PX;
-    if (isTap) moveTo(toWorld(event), modeOf(event));
-    if (isTap || event.pointerId === pointer) end();
+    const isTap = tap?.pointerId === event.pointerId
+      && (event.pointerType !== "touch" || Math.hypot(event.clientX - tap.clientX, event.clientY - tap.clientY) < TAP_PX);
+    if (isTap) choose(event);
+    else if (event.pointerId === pointer) end();
   });
   canvas.addEventListener("pointercancel", (event) => { if (event.pointerId === pointer) end(); });
   canvas.addEventListener("keydown", arrows);
 }
 
-function arrows(event) {
+async function arrows(event) {
   const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-  if (event.key === "Escape") cancelGoal();
-  if (!way || state.links === 0 || event.ctrlKey || event.altKey || event.metaKey) return;
+  if (event.key === "Escape") cancelTarget();
+  if (!way || event.ctrlKey || event.altKey || event.metaKey) return;
   event.preventDefault();
   const mode = modeOf(event);
+  if (await known(shape) === null) return showGoalRefusal(unknown().status);
   const from = aim ?? (state.goal && mode === "goal" ? state.goal.target : endEffector());
   moveTo({ x: rounded(from.x + ARROW_M * way[0]), y: rounded(from.y + ARROW_M * way[1]) }, mode);
   clearTimeout(settle);

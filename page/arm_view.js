@@ -1,24 +1,25 @@
 // The arm on its canvas: grid, reach, trail of the end effector, ghost of the setpoint, target, and the links themselves. World
 // coordinates are metres, x to the right and y up, the base in the middle.
-// Invariant: nothing is drawn without a visible change. Everything behind the arm is drawn at most ten times a second.
+// Invariant: nothing is drawn without a visible change. Everything behind the arm is drawn at most ten times a second. Between two
+// states the trail is a curve if the motion is known, otherwise a straight line. It never leaves the reach.
 
 import { arrowHead, circle, DASHED, line, links, write as writeText } from "./chart.js";
 import { fixed, significant } from "./format.js";
+import { between, firstAfter, POSITION, record } from "./history.js";
 import { gravityLoad, innerReach, joints, reach } from "./mechanics.js";
 import { DEFAULT_EPSILON } from "./runtime.js";
 import { MOST_LINKS, state, watch } from "./store.js";
 import { onFrame, Surface, wake } from "./surface.js";
 import { colors } from "./theme.js";
-import { drawTrail, SECONDS as TRAIL_SECONDS } from "./trail.js";
 
-/** A joint that moves less on the screen counts as not moved [px]. */
-const SEEN = 0.1;
+const SEEN = 0.1; // a joint that moves less on the screen counts as not moved [px]
 const NO_DASH = [];
 const BOTH_WAYS = [-1, 1];
 const ROOM = 1.14; // of the reach, as space for circles and labels
 const EFFORT_RADIUS = 19; // px
 const MOST_DIGITS = 4; // after the point, in the labels of the grid
 
+const q = new Float64Array(MOST_LINKS);
 const x = new Float64Array(MOST_LINKS + 1);
 const y = new Float64Array(MOST_LINKS + 1);
 const load = new Float64Array(MOST_LINKS);
@@ -33,8 +34,7 @@ let stale = true;
 let behindStale = true;
 let fullEffort = 1; // N m, the largest gravity load
 let scale = 100; // pixels per metre
-/** The aimed position of the pointer, while it aims: { x, y, phi, mode, refused }; see `aim.js`. */
-let aim = null;
+let aim = null; // the aimed position of the pointer, while it aims: { x, y, phi, mode, refused }; see `aim.js`
 
 export function startArmView(canvas) {
   behind = document.createElement("canvas");
@@ -130,7 +130,7 @@ function drawArm() {
   if (!known) return false;
   context.lineCap = "round";
   context.lineJoin = "round";
-  drawTrail(context, n, lengths(), px, py, behindTime, state.time, 1);
+  drawTrail(context, behindTime, state.time, 1);
   drawTarget(n);
   drawLinks(n);
   return false;
@@ -147,7 +147,7 @@ function paintBehind(n) {
   drawReach(paint);
   drawGrid(paint);
   drawGravity(paint, state.params?.gravity ?? 0);
-  if (n > 0) drawTrail(paint, n, lengths(), px, py, state.time - TRAIL_SECONDS, state.time);
+  if (n > 0) drawTrail(paint, state.time - TRAIL_SECONDS, state.time, PIECES);
   if (n > 0 && state.setpointKnown) drawGhost(paint, n);
   behindTime = state.time;
 }
@@ -256,8 +256,7 @@ function drawEfforts(n, room) {
   }
 }
 
-/** The clock covers the upper end of the vertical axis [px]. */
-const CLOCK = 56;
+const CLOCK = 56; // the clock covers the upper end of the vertical axis [px]
 const LABEL = "11px system-ui, sans-serif";
 
 function drawReach(paint) {
@@ -321,4 +320,45 @@ function drawGravity(context, gravity) {
   if (!(gravity > 0)) return;
   line(context, x, 12, x, 38, colors.muted, 2);
   arrowHead(context, x, 38, Math.PI / 2, 8);
+}
+
+const TRAIL_SECONDS = 5;
+const PIECES = 6; // the number of its pieces, which fade towards the past
+const BRIGHTEST = 0.7;
+const TURN = 0.15; // the sum of the joints' rotations from one point to the next [rad]
+/** With a larger rotation between two records the path is unknown, and a straight line is drawn [rad]. */
+const FAR = Math.PI;
+
+/** The trail from `since` to `time`, both times of the recording. */
+function drawTrail(paint, since, time, pieces) {
+  const first = firstAfter(since);
+  const rows = Math.min(firstAfter(time), record.length - 1) - first;
+  paint.strokeStyle = colors.accent;
+  paint.lineWidth = 2;
+  paint.lineCap = "butt"; // round ends would be visible where two pieces meet
+  paint.lineJoin = "round";
+  for (let piece = 0; piece < pieces && rows > 0; piece += 1) {
+    paint.globalAlpha = (BRIGHTEST * (piece + 1)) / pieces;
+    paint.beginPath();
+    const to = first + Math.floor(((piece + 1) * rows) / pieces);
+    for (let i = first + Math.floor((piece * rows) / pieces); i < to; i += 1) extend(paint, i);
+    paint.stroke();
+  }
+  paint.lineCap = "round";
+  paint.globalAlpha = 1;
+}
+
+/** From row `i` to the next. */
+function extend(paint, i) {
+  const { data } = record;
+  const n = state.links;
+  const [a, b] = [record.at(i), record.at(i + 1)];
+  let turned = 0;
+  for (let k = 0; k < n; k += 1) turned += Math.abs(data[b + POSITION + k] - data[a + POSITION + k]);
+  const points = turned < FAR ? Math.ceil(turned / TURN) || 1 : 1;
+  for (let point = 0; point <= points; point += 1) {
+    between(a, b, point / points, q);
+    joints(n, q, lengths(), x, y);
+    paint.lineTo(px(x[n]), py(y[n]));
+  }
 }

@@ -73,8 +73,7 @@ export function write(context, text, x, y, align, color = colors.muted, font = T
 /** Space for large labels and titles on both axes. */
 export const ROOMY = { left: 78, right: 16, top: 16, bottom: 40, font: TEXT };
 
-/** Below this distance a point is not seen [px]. */
-const NEAR = 1;
+const NEAR = 1; // below this distance a point is not seen [px]
 
 export class Chart {
   /** @param {Surface} surface @param {Scale} across @param {Scale} up */
@@ -236,8 +235,7 @@ export function drawMap(chart, rows, at, factor) {
   circle(context, chart.x(across.within(at)), chart.y(up.within(factor)), 7, colors.accent, colors.panel, 2);
 }
 
-/** Largest thickness of a long bar [px]. */
-const THICK = 40;
+const THICK = 40; // largest thickness of a long bar [px]
 const NONE = { place: () => 0, marks: [] };
 const ERRORS = new LogScale(1e-10, 1, []);
 ERRORS.marks = ERRORS.powers(6, (value) => (value === 1 ? "1" : powerOfTen(value)));

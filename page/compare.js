@@ -13,17 +13,14 @@ import { fromRest, questionOf, rolloutArgs, withFixedPeriod } from "./question.j
 import { describeRun, distances, endOf } from "./ladder.js";
 import { rollout } from "./runtime.js";
 import { Axis, LogScale, powerOfTen, times } from "./scale.js";
-import { MOST_LINKS, state, watch } from "./store.js";
+import { known, MOST_LINKS, state, unknown, watch } from "./store.js";
 import { onFrame, Surface, wake } from "./surface.js";
 import { colors } from "./theme.js";
 
-/** The reference is Runge-Kutta 4 at this part of the timestep. */
-const REFERENCE_PART = 1 / 8;
-/** Enough samples for a smooth trail, few enough to draw at once. */
-const MOST_SAMPLES = 600;
+const REFERENCE_PART = 1 / 8; // the reference is Runge-Kutta 4 at this part of the timestep
+const MOST_SAMPLES = 600; // enough samples for a smooth trail, few enough to draw at once
 const SECONDS = 5; // default duration
-/** Smaller errors are rounding [rad]. */
-const SMALLEST = 1e-13;
+const SMALLEST = 1e-13; // smaller errors are rounding [rad]
 const ROOM = { left: 50 };
 const COLUMNS = /** @type {const} */ ([["outcome", "outcome"], ["energy", "energy gained"], ["error", "largest error"], ["evaluations", "evaluations"],
   ["time", "run time"]]);
@@ -72,13 +69,9 @@ export function startCompare() {
 }
 
 async function compare() {
-  const present = questionOf({ ...state, enabled: controller.input.value === "on" });
-  if (!present || state.connection !== "open") {
-    said.show("There is no arm to compare: not connected.");
-    return;
-  }
-  const n = state.links;
-  const step = (timestep.number() ?? 1e3 * state.integrator.timestep) / 1e3;
+  const present = await known(() => questionOf({ ...state, enabled: controller.input.value === "on" }));
+  if (!present) return said.show(unknown().status);
+  const step = (timestep.number() ?? 1e3 * present.timestep) / 1e3;
   const asked = seconds.number() ?? SECONDS;
   // A whole number of steps between samples, so all runs are sampled at the same times. The runtime refuses wrong times.
   const steps = step > 0 && asked >= step ? asked / step : NaN;
@@ -100,7 +93,7 @@ async function compare() {
   const away = found.map((run) => distances(run, reference));
   lengths = present.params.lengths;
   instants = reference.times;
-  runs = [...found, reference].map((run, i) => ({ ...tracked(run, n), away: away[i] ?? null, color: i < found.length ? `method${i + 1}` : "muted" }));
+  runs = [...found, reference].map((run, i) => ({ ...tracked(run), away: away[i] ?? null, color: i < found.length ? `method${i + 1}` : "muted" }));
   byId("compare-result").hidden = false;
   byId("compare-scrub").max = String(instants.length - 1);
   at = 0;
@@ -123,7 +116,8 @@ function content() {
 }
 
 /** A run with its poses, null where they are not finite, and the trail of its end effector [m]. */
-function tracked({ times: own, positions, energy }, n) {
+function tracked({ times: own, positions, energy }) {
+  const n = lengths.length;
   const poses = positions.map((q) => (q?.every(Number.isFinite) ? q : null));
   const trail = poses.map((q) => {
     if (!q) return null;

@@ -1,14 +1,14 @@
 // The settings: integrator and timestep, controller and gains, gravity, masses, lengths and setpoint.
 // Invariant: a control shows only values that the runtime accepted. A refusal is shown beside it.
 
-import { byId, el, setText, warn } from "./dom.js";
+import { announce, byId, el, setText, warn } from "./dom.js";
 import { busy, numberField, refusal } from "./field.js";
 import { METHODS, seconds, shortName } from "./format.js";
 import { limitLabel } from "./stability_panel.js";
 import { controlPeriodLimit, limitInForce, periodText } from "./policy.js";
 import { questionOf } from "./question.js";
-import { enable, sendSetpoint, setFriction, setGains, setIntegrator, setMotors, setParams, setPeriod, suggestGains } from "./runtime.js";
-import { LOOP, set, state, watch } from "./store.js";
+import { change, enable, sendSetpoint, suggestGains } from "./runtime.js";
+import { known, LOOP, set, settingsKnown, state, unknown, watch, whenKnown } from "./store.js";
 
 const PLACES = [["Earth", 9.81], ["Moon", 1.62], ["Mars", 3.72], ["Jupiter", 24.79], ["none", 0]];
 /** The same range for both clocks, so their sliders can be compared [ms]. */
@@ -19,7 +19,9 @@ const ECHO_MS = 300;
 let placed = []; // the last sent setpoint
 let placedAt = -Infinity;
 let perJoint = []; // functions that write the stored values to the fields of each joint
+let methodsSaid;
 let controllerSaid;
+let setpointSaid;
 let suggestButton;
 let suggestSaid;
 
@@ -28,6 +30,8 @@ export function startControls() {
   startClocks();
   startGravity();
   startController();
+  setpointSaid = refusal();
+  byId("setpoint-fields").after(setpointSaid.element);
   suggestButton = el("button", { type: "button", class: "small", onclick: takeSuggestion }, "Suggest gains for this arm");
   suggestSaid = refusal(suggestButton);
   byId("suggest").append(suggestButton, suggestSaid.element);
@@ -41,19 +45,29 @@ function showStored() {
 }
 
 function startIntegrator() {
-  const check = () => { for (const radio of radios("method")) radio.checked = radio.value === state.integrator?.method; };
-  const said = refusal(byId("methods"));
+  methodsSaid = refusal(byId("methods"));
   byId("methods").append(...METHODS.map(([method, name], i) => el("label", { class: "segment", title: `${name} (key ${i + 1}), and its limit of the timestep` },
-    el("input", { type: "radio", name: "method", value: method, onchange: () => said.report(setIntegrator({ method })).then(check) }),
+    el("input", { type: "radio", name: "method", value: method, onchange: () => chooseMethod(method) }),
     el("span", {}, `${shortName(method)} `, limitLabel(method)))));
-  byId("methods").after(said.element);
-  watch("integrator", check);
+  byId("methods").after(methodsSaid.element);
+  watch("integrator", checkMethod);
+}
+
+function checkMethod() {
+  for (const radio of radios("method")) radio.checked = radio.value === state.integrator?.method;
+}
+
+export async function chooseMethod(method) {
+  const answer = await methodsSaid.report(change("integrator", { method }));
+  checkMethod();
+  return answer;
 }
 
 /** The timestep and the control period, each with its limit. */
 function startClocks() {
-  const timestep = numberField({ label: "timestep", ...CLOCK, commit: (ms) => setIntegrator({ timestep: seconds(ms) }) });
-  const period = numberField({ label: "control period", ...CLOCK, zero: true, zeroText: "every step", commit: (ms) => setPeriod({ period: seconds(ms) }) });
+  const timestep = numberField({ label: "timestep", ...CLOCK, commit: (ms) => change("integrator", { timestep: seconds(ms) }) });
+  const period = numberField({ label: "control period", ...CLOCK, zero: true, zeroText: "every step",
+    commit: (ms) => change("period", { period: seconds(ms) }) });
   byId("timestep-field").append(timestep.element);
   byId("period-field").append(period.element);
   watch("integrator", ({ timestep: accepted }) => timestep.accept(1e3 * accepted));
@@ -66,10 +80,10 @@ function startClocks() {
 }
 
 function startGravity() {
-  const gravity = numberField({ label: "gravity", unit: "m/s²", low: 0, high: 30, commit: (value) => setParams({ gravity: value }) });
+  const gravity = numberField({ label: "gravity", unit: "m/s²", low: 0, high: 30, commit: (value) => change("params", { gravity: value }) });
   byId("gravity-field").append(gravity.element);
   byId("gravity-places").append(...PLACES.map(([name, value]) => el("button",
-    { type: "button", class: "small", onclick: () => gravity.report(setParams({ gravity: value })) }, name)));
+    { type: "button", class: "small", onclick: () => gravity.report(change("params", { gravity: value })) }, name)));
   watch("params", (params) => gravity.accept(params.gravity));
 }
 
@@ -93,67 +107,63 @@ export function switchController(on) {
 /** Requests gains for the present arm and sets them. The change can be undone. */
 export function takeSuggestion() {
   return busy(suggestButton, "Searching…", async () => {
-    const question = questionOf({ ...state, setpointKnown: true }); // gains do not depend on it
-    if (!question) return;
-    const { result, values } = await suggestSaid.report(suggestGains(question));
+    const asked = () => questionOf({ ...state, setpointKnown: true }); // gains do not depend on it
+    const { result, values } = await suggestSaid.report(whenKnown(asked, suggestGains));
     const { kp, ki, kd } = values.gains ?? values;
-    if (result) suggestSaid.report(setGains({ kp, ki, kd }));
+    if (result) suggestSaid.report(change("gains", { kp, ki, kd }));
   });
 }
 
-/** Moves the setpoint of the chosen joint by `angle` [rad], from the present pose if no setpoint is known. */
+/** Moves the setpoint of the chosen joint by `angle` [rad]. */
 export function nudgeSetpoint(angle) {
-  if (state.links === 0) return;
-  const present = presentSetpoint();
-  const answer = place(present.with(state.joint, Number((present[state.joint] + angle).toFixed(6))));
-  if (!answer.result) warn(answer.status);
+  setpointSaid.report(whenKnown(presentSetpoint, (present) => place(present.with(state.joint, Number((present[state.joint] + angle).toFixed(6))))));
 }
 
-/** The setpoint, or the one just sent, because a held key repeats faster than the runtime answers. */
+/** The setpoint, or the one just sent, because a held key repeats faster than the runtime answers; null if it is not known. */
 function presentSetpoint() {
   if (performance.now() - placedAt < ECHO_MS && placed.length === state.links) return placed;
-  return Array.from((state.setpointKnown ? state.setpoint : state.position).subarray(0, state.links));
+  return state.setpointKnown ? Array.from(state.setpoint.subarray(0, state.links)) : null;
 }
 
 /** There is no answer to a trajectory. It arrives on its topic when it takes effect. */
 function place(positions) {
-  if (state.connection !== "open") return { result: false, status: "not connected", values: {} };
   placed = positions;
   placedAt = performance.now();
-  sendSetpoint(positions);
-  return { result: true, status: "", values: {} };
+  return sendSetpoint(positions);
 }
 
-export function chooseJoint(joint) {
-  if (state.links > 0) set("joint", (joint + state.links) % state.links);
+/** Chooses the joint after the present one, of which there may be none yet. */
+export async function nextJoint() {
+  const links = await known(settingsKnown);
+  if (links === null) return warn(unknown().status);
+  set("joint", (state.joint + 1) % links);
+  announce(`Joint ${state.joint + 1}.`);
 }
 
 // Fields with one entry per joint
 
+/** Their place, their setting, their name and unit, the ends of their sliders, and whether the left end means 0. */
+const JOINT_FIELDS = /** @type {const} */ ([
+  ["masses-fields", "params", "masses", "mass", "kg", 0.05, 20, false],
+  ["lengths-fields", "params", "lengths", "length", "m", 0.1, 3, false],
+  ["kp-fields", "gains", "kp", "proportional gain", "N m/rad", 2, 20000, true],
+  ["ki-fields", "gains", "ki", "integral gain", "N m/(rad s)", 5, 50000, true],
+  ["kd-fields", "gains", "kd", "derivative gain", "N m s/rad", 0.1, 1000, true],
+  ["friction-fields", "friction", "viscous", "friction", "N m s/rad", 0.01, 100, true],
+  ["limit-fields", "motors", "effort", "effort limit", "N m", 1, 1000, false],
+]);
+
 function makeJointFields(links) {
   perJoint = [];
-  const of = (group, key, send) => ({ stored: () => state[group]?.[key], send: (values) => send({ [key]: values }) });
-  const gain = (key, unit, high, name) => fill(`${key}-fields`, links,
-    { unit, low: high / 1e4, high, log: true, zero: true, name, ...of("gains", key, setGains) });
-  fill("masses-fields", links, { unit: "kg", low: 0.05, high: 20, log: true, name: "mass", ...of("params", "masses", setParams) });
-  fill("lengths-fields", links, { unit: "m", low: 0.1, high: 3, log: true, name: "length", ...of("params", "lengths", setParams) });
-  gain("kp", "N m/rad", 20000, "proportional gain");
-  gain("ki", "N m/(rad s)", 50000, "integral gain");
-  gain("kd", "N m s/rad", 1000, "derivative gain");
-  fill("friction-fields", links, {
-    unit: "N m s/rad", low: 0.01, high: 100, log: true, zero: true, name: "friction", stored: () => state.friction?.viscous,
-    send: (viscous) => setFriction({ viscous }),
-  });
-  fill("limit-fields", links, {
-    unit: "N m", low: 1, high: 1000, log: true, name: "effort limit", stored: () => state.motors?.effort ?? undefined, send: (effort) => setMotors({ effort }),
-  });
+  for (const [id, group, key, name, unit, low, high, zero] of JOINT_FIELDS) {
+    fill(id, links, { name, unit, low, high, zero, log: true, stored: () => state[group]?.[key], send: (values) => change(group, { [key]: values }) });
+  }
   fill("setpoint-fields", links, { unit: "rad", low: -Math.PI, high: Math.PI, name: "setpoint",
-    stored: () => (state.setpointKnown ? Array.from(state.setpoint.subarray(0, links)) : undefined), values: presentSetpoint,
-    send: async (positions) => place(positions),
+    stored: () => (state.setpointKnown ? Array.from(state.setpoint.subarray(0, links)) : undefined), values: presentSetpoint, send: place,
   });
   byId("joint-choice").replaceChildren(...Array.from({ length: links },
     (_, joint) => el("label", { class: `segment joint${joint + 1}`, title: `Joint ${joint + 1} (key j for the next)` },
-    el("input", { type: "radio", name: "joint", onchange: () => chooseJoint(joint) }), el("span", {}, `${joint + 1}`))));
+    el("input", { type: "radio", name: "joint", onchange: () => set("joint", joint) }), el("span", {}, `${joint + 1}`))));
   set("joint", state.joint < links ? state.joint : 0);
   showStored();
 }
@@ -166,7 +176,8 @@ function radios(name) {
 /** One field per joint of the `stored` array. A change sends all `values`, which may be newer. */
 function fill(id, links, /** @type {any} */ { name, stored, values = stored, send, ...options }) {
   const fields = Array.from({ length: links }, (_, joint) => numberField({
-    label: `${name} ${joint + 1}`, short: String(joint + 1), className: `joint${joint + 1}`, ...options, commit: (value) => send(values().with(joint, value)),
+    label: `${name} ${joint + 1}`, short: String(joint + 1), className: `joint${joint + 1}`, ...options,
+    commit: (value) => whenKnown(values, (present) => send(present.with(joint, value))),
   }));
   byId(id).replaceChildren(...fields.map((one) => one.element));
   perJoint.push(() => { if (stored()?.length === links) fields.forEach((one, joint) => one.accept(stored()[joint])); });

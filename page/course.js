@@ -26,8 +26,7 @@ import { DEFAULTS } from "./settings.js";
 export const BEYOND = { 2: 0.0055, 3: 0.0038 };
 /** A period well below the limit [s]. @type {Record<number, number>} */
 const WITHIN = { 2: 0.004, 3: 0.002 };
-/** Short enough that the simulation's error is not visible [s]. */
-const FINE = 0.0001;
+const FINE = 0.0001; // short enough that the simulation's error is not visible [s]
 /** Gains that are soft enough for a visible response, with some integral. @type {Record<number, import("./settings.js").Gains>} */
 export const SOFT = {
   2: { kp: [200, 100], ki: [60, 30], kd: [60, 20] },
@@ -35,17 +34,14 @@ export const SOFT = {
 };
 /** Effort limits of that step: little more than the weight needs [N m]. @type {Record<number, number[]>} */
 export const WEAK = { 2: [30, 10], 3: [60, 25, 8] };
-/** Four methods. */
-const ALL = 4;
-/** The required reduction of the method's error. */
-const MUCH = 100;
+const ALL = 4; // four methods
+const MUCH = 100; // the required reduction of the method's error
 const SOME_SCENES = 3;
 /** Energy counts as kept if it never differs by more from that of the start [J], for this time [s] and at this timestep [s]. */
 export const KEPT = 0.1;
 const LONG = 10;
 const STRIDE = 0.005;
-/** The first joint state after a reset comes within this time [s]. */
-const FIRST = 0.1;
+const FIRST = 0.1; // the first joint state after a reset comes within this time [s]
 
 /** @param {number} links @param {number} period @param {Partial<Settings>} [changed] @returns {Settings} */
 function controlled(links, period, changed = {}) {

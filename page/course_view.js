@@ -7,7 +7,7 @@ import { keepAnswer, startAnswers } from "./answers.js";
 import { Chart, drawBars, drawErrors, drawMap, drawPicture, drawResponses, ROOMY } from "./chart.js";
 import { copyable } from "./copy.js";
 import { followEnergy, KEPT, ofLimit, nothingSeen, shrinks, SOFT, stepIn, STEPS, stepsIn, WEAK } from "./course.js";
-import { announce, byId, el, goToAddress, keepChoice, passFocus, remembered, setAddress, setAttribute, setText } from "./dom.js";
+import { announce, byId, el, keepChoice, passFocus, remembered, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
 import { duration, fixed, inPageNames, METHODS, multipleOf, partOf, seconds, shortName, significant } from "./format.js";
 import { ENERGY, newest, record, recorded, VELOCITY } from "./history.js";
@@ -16,19 +16,19 @@ import { moveOf } from "./ladder.js";
 import { drawLadder, keyOf, presentMove } from "./ladder_panel.js";
 import { isAlone, linksIn } from "./kernel.js";
 import { latestOnly } from "./latest.js";
-import { drawMotions, FAILING, motionOf, motionsOf } from "./motions.js";
+import { FAILING, motionOf, motionsOf, playMotions } from "./motions.js";
 import { controlPeriodLimit, verdict } from "./policy.js";
-import { fromRest, questionOf, rolloutArgs, stabilityArgs, stepsPerUpdate } from "./question.js";
+import { fromRest, heldTime, questionOf, rolloutArgs, stepsPerUpdate } from "./question.js";
 import { connectionText } from "./readouts.js";
-import { pause, rollout, setGains, setIntegrator, setMotors, setParams, setPeriod, setState, step as stepArm } from "./runtime.js";
+import { change, pause, rollout, setState, step as stepArm } from "./runtime.js";
 import { judge, keep as keepResponse, LASTS, nameOf, present, responsesContent, shown } from "./responses.js";
 import { LogScale } from "./scale.js";
 import { SCENES, settingsOf } from "./scenes.js";
 import { DEFAULTS, fromFragment, hasSettings, presentSettings, toFragment } from "./settings.js";
 import { showForm } from "./sheet.js";
-import { state, watch, watchAll } from "./store.js";
+import { known, settingsKnown, state, unknown, watch, watchAll } from "./store.js";
 import { StripChart } from "./strip_chart.js";
-import { climbRows, deviation, limitsContent, Series } from "./study.js";
+import { Border, deviation, Series } from "./study.js";
 import { Surface } from "./surface.js";
 
 const FIRST = 0.5; // s: in this time of a response its settings are read
@@ -36,6 +36,7 @@ const SHAKES = 2; // rad/s: a visible speed beyond the limit
 const LOOK_MS = 500;
 const STEPS_SHOWN = 40; // measurements shown in slow motion
 const ROWS = 13; // of the map's border
+const FINEST = 0.001; // s: timestep at the border, which does not depend on it
 const SPAN = 5; // s of the strip chart
 const MEASURED = 1; // s of a measured move
 const ALL_JOINTS = [true, true, true];
@@ -51,16 +52,17 @@ const FACTORS = new LogScale(0.25, 4, [0.25, 0.5, 1, 2, 4].map((one) => [one, `$
  * @property {() => string} caption
  * @property {() => void} [draw] on the surface; nothing where the step has no chart
  * @property {() => import("./copy.js").Content | null} [content] to be copied
- * @property {(loop: import("./question.js").Question) => Promise<void>} [ask] for what it shows, about a loop from rest
+ * @property {(loop: import("./question.js").Question) => Promise<any>} [ask] for what it shows, about a loop from rest
  */
+const content = () => now.found?.content ?? null;
 /** @type {Record<string, ChartOfStep>} */
 const CHARTS = {
   velocity: { caption: () => "Speed of the joints [rad/s]", ...strip("Speed of the joints", [{ column: VELOCITY }]) },
   energy: { caption: () => "Energy lost or gained since the start [J]", ...strip("Energy", [{ column: ENERGY, color: "ink" }], { level: 0 }) },
-  bars: { caption: () => "A tiny push, at each measurement", draw: () => drawBars(surface, now.bars), ask: askBars, content: () => now.content },
+  bars: { caption: () => "A tiny push, at each measurement", draw: () => drawBars(surface, now.found?.bars ?? []), ask: askBars, content },
   errors: {
-    caption: () => `Two errors of one move: ${shortName(state.integrator?.method)}, control period ${duration(period())}`,
-    draw: () => drawErrors(surface, now.errors), ask: askErrors, content: () => now.content,
+    caption: () => `Two errors of one move: ${shortName(state.integrator?.method)}, control period ${duration(heldTime(state))}`,
+    draw: () => drawErrors(surface, now.found?.errors), ask: askErrors, content,
   },
   responses: {
     caption: () => "Joint 1 comes up to its setpoint",
@@ -70,15 +72,13 @@ const CHARTS = {
     },
     content: () => responsesContent(now.responses),
   },
-  map: {
-    caption: () => "Which period is stable", draw: paintMap, ask: askMap,
-    content: () => limitsContent("Which period is stable", now.border, (factor) => stabilityArgs(borderQuestion(now.loop, factor))),
-  },
+  map: { caption: () => "Which period is stable", draw: paintMap, ask: askMap, content: () => border.content("Which period is stable") },
   ladder: { caption: () => "Error over run time", draw: () => drawLadder(surface, now.series.runs), content: () => now.series.content() },
-  pictures: { caption: () => now.scene || "Twelve scenes", draw: paintMotions },
+  pictures: { caption: () => now.scene || "Twelve scenes", draw: () => playMotions(surface, now.motions, now.played, PLAYED_MS, ROUNDS) },
   form: { caption: () => "My arm" },
 };
 
+const border = new Border(FACTORS, ROWS, () => surface.redraw());
 let at = 0; // the present step
 let now = anew(); // the actions in it; a new object when its scene is set again
 let surface;
@@ -93,20 +93,15 @@ function anew() {
     answered: -1,
     ticked: false,
     seen: nothingSeen(),
-    bars: /** @type {number[]} */ ([]),
-    errors: /** @type {{error: number | null, sampling: number | null} | null} */ (null),
-    content: /** @type {import("./copy.js").Content | null} */ (null), // of bars and errors
+    found: /** @type {any} */ (null), // the answer that the chart shows: its bars or errors, and what can be copied of it
     firstError: NaN,
     responses: /** @type {import("./responses.js").Response[]} */ ([]),
     response: "", // the settings of the present one; empty if they changed on the way, and once it is kept
     series: new Series(),
     asked: "", // the settings of the chart
-    loop: /** @type {any} */ (null), // the question of the chart
-    border: /** @type {import("./chart.js").Row[]} */ ([]),
     scene: "", // the sentence of the started scene
     motions: /** @type {import("./motions.js").Motion[]} */ ([]), // of the started scene
     played: 0, // the time since they began [ms]
-    borderAsked: "", // the arm and the gains without damping of the border
   };
 }
 
@@ -136,14 +131,14 @@ export function startCourse() {
   byId("course-back").addEventListener("click", () => go(at - 1));
   byId("course-next").addEventListener("click", () => go(at + 1));
   byId("course-start").addEventListener("click", begin);
-  byId("course-again").addEventListener("click", again);
+  byId("course-again").addEventListener("click", () => report(again()));
   byId("course-steps").append(...STEPS.map((one, i) => el("button", {
     type: "button", class: "small", "data-step": one.id, "aria-label": `Step ${i + 1}: ${one.title}`, title: one.title, onclick: () => go(i),
   }, String(i + 1))));
   tick(...stepsIn(remembered(TICKS)), ...stepsIn(new URLSearchParams(location.hash.slice(1)).get("done")));
   at = Math.max(0, stepIn(location.hash));
   startAnswers();
-  watch("links", open);
+  watch(["links", "answered"], open);
   let before = "";
   watch("connection", (connection) => {
     // A silent server still has the scene.
@@ -163,7 +158,7 @@ export function followLink() {
 }
 
 function open() {
-  if (isAlone && state.links > 0 && state.view === "course" && !hasSettings(fromFragment(location.hash))) begin();
+  if (isAlone && settingsKnown() && state.view === "course" && !hasSettings(fromFragment(location.hash))) begin();
   else rest();
 }
 
@@ -199,7 +194,7 @@ function rest() {
 function go(to) {
   if (to < 0 || to >= STEPS.length) return;
   at = to;
-  goToAddress(`#${[`step=${STEPS[at].id}`, linksInLink()].filter(Boolean).join("&")}`);
+  setAddress(`#${[`step=${STEPS[at].id}`, linksInLink()].filter(Boolean).join("&")}`, "pushState");
   begin();
   byId("course-title").focus();
 }
@@ -207,10 +202,14 @@ function go(to) {
 /** Sets the scene of the step, or restarts it. */
 async function begin() {
   now = anew();
-  const mine = now;
-  now.began = state.links > 0;
+  const [mine, step] = [now, at];
+  now.began = settingsKnown() !== null;
   show();
-  if (!now.began) return;
+  if (!now.began) {
+    // A click before the arm is known counts once it is.
+    if (await known(settingsKnown) !== null && step === at && !now.began) begin();
+    return;
+  }
   remember();
   const { scene, offset, paused, title, text } = STEPS[at];
   // An arm that starts elsewhere is not yet moving there.
@@ -230,21 +229,28 @@ async function begin() {
 /** Restarts the arm of the step, with the present settings. */
 async function again() {
   const { offset, paused } = STEPS[at];
-  if (!offset) return void await beginAnew();
+  if (!offset) return beginAnew();
   await pause(true);
-  await beginAnew();
+  const answer = await beginAnew();
   await setState(offset.slice(0, state.links));
   if (!paused) await pause(false);
+  return answer;
+}
+
+/** Shows a refusal in the step's line. */
+async function report(call) {
+  const { result, status } = await call;
+  if (!result) setText(byId("course-status"), inPageNames(status));
 }
 
 /** The arm takes two control steps a second. It begins again after some, with another period, and when it has diverged. */
 async function slowMotion(mine) {
-  let [taken, at] = [0, period()];
+  let [taken, at] = [0, heldTime(state)];
   while (mine === now) {
     await new Promise((done) => setTimeout(done, LOOK_MS));
     if (mine !== now || state.view !== "course" || !state.paused || document.hidden || state.connection !== "open") continue;
-    if (taken >= STEPS_SHOWN || at !== period() || state.diverged) {
-      [taken, at] = [0, period()];
+    if (taken >= STEPS_SHOWN || at !== heldTime(state) || state.diverged) {
+      [taken, at] = [0, heldTime(state)];
       await again();
     }
     await stepArm(stepsPerUpdate(state));
@@ -260,11 +266,6 @@ async function changed(change) {
   const answer = await change;
   if (answer.result && (state.diverged || ["energy", "responses"].includes(STEPS[at].chart))) await again();
   return answer;
-}
-
-/** The control period [s]. */
-function period() {
-  return state.integrator ? stepsPerUpdate(state) * state.integrator.timestep : NaN;
 }
 
 /** The usual damping gains, times a factor. @param {number} factor */
@@ -287,10 +288,10 @@ function show() {
   setText(byId("course-text"), one.text);
   const lost = state.connection !== "open";
   const start = `Press “Start” to set the arm.${isAlone ? "" : " Other viewers see the change."}`;
-  setText(byId("course-status"), connectionText() || (state.links === 0 || now.began ? "" : start));
+  setText(byId("course-status"), connectionText() || (!settingsKnown() || now.began ? "" : start));
   setText(byId("course-start"), now.began ? "Restart step" : "Start");
   if (lost) passFocus(byId("course-start"), byId("course-title"));
-  byId("course-start").disabled = state.links === 0 || lost;
+  byId("course-start").disabled = !settingsKnown() || lost;
   byId("course-back").disabled = at === 0;
   byId("course-next").disabled = at === STEPS.length - 1;
   [...byId("course-steps").children].forEach((button, i) => {
@@ -300,7 +301,7 @@ function show() {
   byId("course-chart").hidden = !CHARTS[one.chart].draw || one.chart === "pictures";
   markOutdated(false);
   byId("course-extra").replaceChildren();
-  if (state.links > 0) fillExtra(one);
+  if (settingsKnown()) fillExtra(one);
   makeDial(one);
   showBig();
   showTask();
@@ -309,17 +310,13 @@ function show() {
 
 function fillExtra(one) {
   const place = byId("course-extra");
-  if (one.methods) {
-    place.append(el("div", { class: "buttons course-methods", role: "group", "aria-label": "method" }, ...METHODS.map(([method]) => el("button", {
-      type: "button", "data-method": method, "aria-pressed": String(method === state.integrator?.method), onclick: () => changed(setIntegrator({ method })),
-    }, shortName(method)))));
-  }
-  if (one.chart === "responses") place.append(motorButtons());
-  if (one.chart === "map") {
-    place.append(el("div", { class: "buttons", role: "group", "aria-label": "mass of the last link" }, ...MASSES.map((mass) => el("button", {
-      type: "button", class: "small", "data-mass": mass, onclick: () => changed(setParams({ masses: [...state.params.masses.slice(0, -1), mass] })),
-    }, `last link ${mass} kg`))));
-  }
+  if (one.methods) place.append(choices("method", "method", METHODS.map(([method]) => [method, shortName(method), "integrator", () => ({ method })])));
+  if (one.chart === "responses") place.append(choices("motors", "effort limit and anti-windup", CURES.map(([name, isWeak, anti_windup]) => {
+    const effort = isWeak ? WEAK[state.links] : null;
+    return [String([isWeak, anti_windup]), effort ? `${effort[0]} N m, ${name}` : name, "motors", () => ({ effort, anti_windup })];
+  })));
+  if (one.chart === "map") place.append(choices("mass", "mass of the last link", MASSES.map((mass) => [String(mass), `last link ${mass} kg`, "params",
+    () => ({ masses: [...state.params.masses.slice(0, -1), mass] })])));
   if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure",
     onclick: ({ target }) => busy(target, "Measuring…", measure) }, "Measure"));
   if (one.chart === "pictures") place.append(gallery(state.links));
@@ -327,16 +324,23 @@ function fillExtra(one) {
     showForm(place, () => { now.seen.sheet = true; look(); });
     place.append(robotForm());
   }
+  showChosen();
 }
 
-/** The effort limit, and what the integral does at it. */
-function motorButtons() {
-  const choices = [["no limit", null, "clamp"], ["no cure", WEAK, "none"], ["conditional", WEAK, "conditional"],
-    ["back-calculation", WEAK, "back_calculation"]];
-  const set = (weak, anti_windup) => changed(setMotors({ effort: weak && weak[state.links], anti_windup }));
-  return el("div", { class: "buttons", role: "group", "aria-label": "effort limit and anti-windup" }, ...choices.map(([name, weak, anti]) => el("button", {
-    type: "button", class: "small", "data-motors": JSON.stringify([weak !== null, anti]), disabled: !state.motors, onclick: () => set(weak, anti),
-  }, weak ? `${weak[state.links][0]} N m, ${name}` : name)));
+/** Whether the efforts are limited, and what the integral does at the limit. @type {[string, boolean, string][]} */
+const CURES = [["no limit", false, "clamp"], ["no cure", true, "none"], ["conditional", true, "conditional"], ["back-calculation", true, "back_calculation"]];
+
+/** The present choice of each group of buttons, as the text that marks its button. */
+const PRESENT = /** @type {Record<string, () => string>} */ ({
+  method: () => String(state.integrator?.method), mass: () => String(state.params?.masses.at(-1)),
+  motors: () => String([Boolean(state.motors?.effort), state.motors?.anti_windup]),
+});
+
+/** Buttons that change settings. @param {string} kind @param {string} label @param {any[][]} list the mark, text, group and new settings of each */
+function choices(kind, label, list) {
+  return el("div", { class: `buttons course-${kind}`, role: "group", "aria-label": label }, ...list.map(([mark, text, group, settings]) => el("button", {
+    type: "button", class: "small", [`data-${kind}`]: mark, disabled: !state[group], onclick: () => report(changed(change(group, settings()))),
+  }, text)));
 }
 
 /** The three gains of joint 1. The other joints have them in proportion. */
@@ -345,7 +349,7 @@ function gainFields() {
     kp: ["N m/rad", 20, 2000], ki: ["N m/(rad s)", 2, 2000], kd: ["N m s/rad", 5, 200] });
   return Object.entries(ranges).map(([key, [unit, low, high]]) => {
     const base = SOFT[state.links][key];
-    const commit = (value) => changed(setGains({ [key]: base.map((one) => Number(((value * one) / base[0]).toPrecision(6))) }));
+    const commit = (value) => changed(change("gains", { [key]: base.map((one) => Number(((value * one) / base[0]).toPrecision(6))) }));
     const field = numberField({ label: `${key} of joint 1`, short: key, unit, low, high, log: true, zero: key === "ki", commit });
     return { element: field.element, show: () => field.accept(state.gains[key][0]) };
   });
@@ -418,22 +422,15 @@ async function showMotions(scene, mine) {
   surface.redraw();
 }
 
-/** The clock at which a motion is over [ms], and how often it is played. */
-const PLAYED_MS = 6000;
-const ROUNDS = 3;
-
-function paintMotions() {
-  const part = (performance.now() - now.played) / PLAYED_MS;
-  drawMotions(surface, now.motions, part < ROUNDS ? part % 1 : 1);
-  if (part < ROUNDS) requestAnimationFrame(() => { if (now.motions.length > 0) surface.redraw(); });
-}
+const PLAYED_MS = 6000; // the clock at which a motion is over [ms]
+const ROUNDS = 3; // how often it is played
 
 /** The clock of a step: its slider, its present value and its limit [ms]. */
 function clock(one) {
   if (one.dial !== "timestep") {
     return {
-      label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => changed(setPeriod({ period: seconds(ms) })),
-      value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state), fit: (ms) => multipleOf(1e3 * state.integrator.timestep, ms),
+      label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => changed(change("period", { period: seconds(ms) })),
+      value: () => 1e3 * heldTime(state), limit: () => 1e3 * controlPeriodLimit(state), fit: (ms) => multipleOf(1e3 * state.integrator.timestep, ms),
         rule: "it must be a whole number of timesteps",
     };
   }
@@ -441,7 +438,7 @@ function clock(one) {
   const whole = one.chart === "errors"
     ? { high: 4, fit: (ms) => partOf(1e3 * (state.period?.period ?? 0), ms), rule: "it must divide the control period" } : { high: 100 };
   return {
-    label: "timestep", unit: "ms", low: 0.1, ...whole, commit: (ms) => changed(setIntegrator({ timestep: seconds(ms) })),
+    label: "timestep", unit: "ms", low: 0.1, ...whole, commit: (ms) => changed(change("integrator", { timestep: seconds(ms) })),
     value: () => 1e3 * (state.integrator?.timestep ?? NaN), limit: () => NaN,
   };
 }
@@ -454,7 +451,7 @@ function makeDial(one) {
   place.hidden = !one.dial || (one.guess && now.guessed < 0);
   // While the scene is being set, its values would replace the student's.
   place.inert = now.began && !now.ready;
-  if (!one.dial || state.links === 0) return;
+  if (!one.dial || !settingsKnown()) return;
   if (one.dial === "gains") {
     const fields = gainFields();
     place.append(...fields.map(({ element }) => element));
@@ -462,7 +459,7 @@ function makeDial(one) {
     return dial.show();
   }
   const { value, limit, ...options } = one.dial === "damping"
-    ? { label: "damping gains", unit: "times", low: FACTORS.low, high: FACTORS.high, commit: (factor) => changed(setGains({ kd: damped(factor) })),
+    ? { label: "damping gains", unit: "times", low: FACTORS.low, high: FACTORS.high, commit: (factor) => changed(change("gains", { kd: damped(factor) })),
       value: damping, limit: () => NaN }
     : clock(one);
   const field = numberField({ log: true, ...options });
@@ -590,8 +587,8 @@ function look() {
   const fastest = Math.max(...state.velocity.subarray(0, state.links).map(Math.abs));
   seen.methods.add(state.integrator.method);
   seen.reached ||= state.goal?.outcome === "reached";
-  seen.shook ||= state.enabled && period() > controlPeriodLimit(state) && (fastest > SHAKES || kind === "diverged");
-  seen.stable = state.enabled === true && period() < controlPeriodLimit(state) && kind !== "diverged" && sceneIsSet;
+  seen.shook ||= state.enabled && heldTime(state) > controlPeriodLimit(state) && (fastest > SHAKES || kind === "diverged");
+  seen.stable = state.enabled === true && heldTime(state) < controlPeriodLimit(state) && kind !== "diverged" && sceneIsSet;
   if (one.methods && one.chart === "velocity" && !sceneIsSet) seen.methods.clear();
   if (one.chart === "energy" && state.enabled === false && record.length > 0) {
     const of = JSON.stringify([state.integrator, state.params]);
@@ -611,15 +608,9 @@ function look() {
   showTask();
 }
 
-/** If the step offers methods or masses, marks the present one. */
 function showChosen() {
-  const { method } = /** @type {any} */ (state.integrator);
-  const mass = state.params?.masses.at(-1);
-  const motors = JSON.stringify([Boolean(state.motors?.effort), state.motors?.anti_windup]);
-  for (const button of byId("course-extra").querySelectorAll("[data-method], [data-mass], [data-motors]")) {
-    const { dataset } = button;
-    const isChosen = (dataset.method ?? method) === method && Number(dataset.mass ?? mass) === mass && (dataset.motors ?? motors) === motors;
-    setAttribute(button, "aria-pressed", String(isChosen));
+  for (const [kind, present] of Object.entries(PRESENT)) {
+    for (const one of byId("course-extra").querySelectorAll(`[data-${kind}]`)) setAttribute(one, "aria-pressed", String(one.dataset[kind] === present()));
   }
 }
 
@@ -633,9 +624,9 @@ function refresh({ chart }) {
   const present = questionOf({ ...state, enabled: true, setpointKnown: true });
   if (!present || !CHARTS[chart].ask) return;
   const loop = fromRest({ ...present, setpoint: present.setpoint.map(() => 0) });
-  const key = JSON.stringify([loop, period()]);
+  const key = JSON.stringify([loop, heldTime(state)]);
   if (key === now.asked) return;
-  Object.assign(now, { asked: key, loop });
+  now.asked = key;
   markOutdated(true);
   inquire({ ask: CHARTS[chart].ask, mine: now, key, loop });
 }
@@ -647,61 +638,46 @@ function markOutdated(/** @type {boolean} */ outdated) {
 
 const inquire = latestOnly(async ({ ask, mine, key, loop }) => {
   if (mine !== now) return;
-  await ask(loop);
-  if (mine === now && key === now.asked) markOutdated(false);
+  const found = await ask(loop);
+  if (mine === now && key === now.asked) {
+    now.found = found;
+    markOutdated(false);
+  }
   surface.redraw();
   look();
 }, 60);
 
 async function askBars(loop) {
-  const mine = now;
+  const { seen } = now;
   // Without gravity, so only the push is visible. It is a push of the velocity, which excites the fastest motion of the loop.
-  const found = await deviation({ ...loop, params: { ...loop.params, gravity: 0 } }, loop.q, period());
-  mine.bars = found?.bars ?? [];
-  mine.content = found?.content ?? null;
-  mine.seen.shrinks = shrinks(mine.bars);
+  const found = await deviation({ ...loop, params: { ...loop.params, gravity: 0 } }, loop.q, heldTime(state));
+  seen.shrinks = shrinks(found?.bars ?? []);
+  return found;
 }
 
 async function askErrors(loop) {
   const mine = now;
   const run = { duration: 2, samples: 101, reference: true };
-  const { result, values } = await rollout(moveOf(loop), run);
-  mine.errors = mine.content = null;
-  if (!result) return;
-  mine.content = {
-    name: "Two errors of one move", columns: ["error of the method [rad]", "error of the hold [rad]"], rows: [[values.error, values.sampling_error]],
+  const { result, values: { error, sampling_error: sampling } } = await rollout(moveOf(loop), run);
+  if (!result) return null;
+  if (Number.isNaN(mine.firstError) && error > 0) mine.firstError = error;
+  mine.seen.gain = mine.firstError / (error ?? NaN);
+  return { errors: { error, sampling }, content: {
+    name: "Two errors of one move", columns: ["error of the method [rad]", "error of the hold [rad]"], rows: [[error, sampling]],
     asked: [rolloutArgs(moveOf(loop), run)], python: "[(run.error, run.sampling_error) for run in runs]",
-  };
-  mine.errors = { error: values.error, sampling: values.sampling_error };
-  if (Number.isNaN(mine.firstError) && values.error > 0) mine.firstError = values.error;
-  mine.seen.gain = mine.firstError / (values.error ?? NaN);
+  } };
 }
 
-/** The border of the map. The damping moves the dot, not the border. */
-async function askMap(loop) {
-  const mine = now;
-  const key = borderKey(loop);
-  if (key === mine.borderAsked) return;
-  Object.assign(mine, { borderAsked: key, border: [] });
-  await climbRows(FACTORS, ROWS, (factor) => borderQuestion(loop, factor), () => mine === now && key === borderKey(mine.loop), (factor, values) => {
-    mine.border.push({ factor, limit: values.control_period_limit ?? Infinity });
-    surface.redraw();
-  });
-}
-
-function borderQuestion(loop, factor) {
-  return { ...loop, integrator: "rk4", control_period: 0, gains: { ...loop.gains, kd: damped(factor) } };
-}
-
-/** What the border depends on: all of the loop but the damping and the clocks. */
-function borderKey({ params, gains, delay }) {
-  return JSON.stringify([params, gains.kp, gains.ki, delay]);
+/** The border of the map. The damping and the clocks move the dot, not the border. */
+function askMap(loop) {
+  const common = { ...loop, integrator: "rk4", timestep: FINEST, control_period: 0 };
+  return border.ask((factor) => ({ ...common, gains: { ...loop.gains, kd: damped(factor) } }), { limit: "control_period_limit" });
 }
 
 async function measure() {
   const mine = now;
-  const move = presentMove();
-  if (!move) return;
+  const move = await known(presentMove);
+  if (!move) return setText(byId("course-status"), unknown().status);
   const refused = await mine.series.measure(move, MEASURED, () => mine === now, () => surface.redraw());
   if (refused === null) return;
   setText(byId("course-status"), inPageNames(refused));
@@ -725,5 +701,5 @@ function strip(name, series, more) {
 function paintMap() {
   const chart = new Chart(surface, PERIODS, FACTORS, ROOMY);
   chart.frame({ across: "control period", up: "damping gains", grid: false });
-  drawMap(chart, now.border, period(), damping());
+  drawMap(chart, border.rows, heldTime(state), damping());
 }

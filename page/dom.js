@@ -31,19 +31,13 @@ export function byId(id) {
   return document.getElementById(id);
 }
 
-/** Sets the page's address. Inside a frame this may be forbidden. @param {string | URL} address */
-export function setAddress(address) {
+/**
+ * Sets the page's address. Inside a frame this may be forbidden. With "pushState" it is a new entry of the history, so that the browser's Back leads to
+ * the present one. @param {string | URL} address @param {"replaceState" | "pushState"} [how]
+ */
+export function setAddress(address, how = "replaceState") {
   try {
-    history.replaceState(history.state, "", address);
-  } catch {
-    // then it does not change
-  }
-}
-
-/** The same as a new entry of the history, so that the browser's Back leads to the present one. @param {string} address */
-export function goToAddress(address) {
-  try {
-    history.pushState(history.state, "", address);
+    history[how](history.state, "", address);
   } catch {
     // then it does not change
   }

@@ -10,8 +10,7 @@ const SLIDER_STEPS = 400;
 const SEND_MS = 70;
 /** Digits by which two values are compared. The conversion of units changes the last ones. */
 const DIGITS = 12;
-/** A longer choice needs a row of its own [characters]. */
-const LONG = 20;
+const LONG = 20; // a longer choice needs a row of its own [characters]
 let nextId = 1;
 
 /** The place for a refusal or a note, shown until its cause is gone. `describes` are its controls. */

@@ -2,8 +2,7 @@
 // Invariant: a value that is not finite is shown as a dash.
 
 const MINUS = "\u2212";
-/** Most digits of a number in a caption. */
-const MOST_DIGITS = 5;
+const MOST_DIGITS = 5; // most digits of a number in a caption
 
 /** @param {number} value @param {number} digits */
 export function fixed(value, digits) {

@@ -8,15 +8,14 @@ import { linearised } from "./mechanics.js";
 import { answerInForce, limitText } from "./policy.js";
 import { questionOf } from "./question.js";
 import { heldLimit } from "./runtime.js";
-import { state } from "./store.js";
+import { known, state, unknown } from "./store.js";
 
 /** @type {[string, string, boolean?][]} fields of numbers; a matrix has several rows */
 const LISTS = [["mass_matrix", "mass matrix M at the pose [kg m²], a row in each line", true], ["kp", "kp [N m/rad]"], ["ki", "ki [N m/(rad s)]"],
   ["kd", "kd [N m s/rad]"], ["damping", "damping of the joints [N m s/rad]"], ["stiffness", "stiffness: springs and gravity [N m/rad]", true]];
 const BETWEEN = /** @type {[string, string][]} */ ([["exact", "exact motion, as a real robot"], ["semi_implicit", "semi-implicit Euler"],
   ["implicit", "Euler, implicit in the damping"], ...METHODS.map(([method, name]) => [method, name])]);
-/** Digits of the numbers of the present arm. */
-const DIGITS = 10;
+const DIGITS = 10; // digits of the numbers of the present arm
 
 /** The form in a part that opens. It begins with the present arm, controlled. */
 export function robotForm() {
@@ -28,9 +27,9 @@ export function robotForm() {
   const options = [...lists, between, period, steps, delay];
   const answer = el("div", { class: "robot-answer", role: "status" });
 
-  const fill = () => {
-    const question = questionOf({ ...state, enabled: true, setpointKnown: true });
-    if (!question) return;
+  const fill = async () => {
+    const question = await known(() => questionOf({ ...state, enabled: true, setpointKnown: true }));
+    if (!question) return said.show(unknown().status);
     const args = heldArgs(question, state.enabled ? answerInForce(state)?.equilibrium ?? question.setpoint : question.q);
     const text = (/** @type {any} */ value) => (Array.isArray(value) ? value.map(text).join(Array.isArray(value[0]) ? "\n" : " ")
       : exact(Number(value.toPrecision(DIGITS))));

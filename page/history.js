@@ -7,8 +7,7 @@ import { questionOf, rolloutArgs } from "./question.js";
 import { toFragment } from "./settings.js";
 import { MOST_LINKS, state } from "./store.js";
 
-/** Five minutes at 60 rows a second: 2.9 MB, allocated once. */
-const ROWS = 18000;
+const ROWS = 18000; // five minutes at 60 rows a second: 2.9 MB, allocated once
 
 /** Largest sum of the slopes at both ends of a smooth motion: a multiple of the change, plus an allowance at a turning point [rad]. */
 const [STEEP, TURNING] = [6, 0.5];
@@ -76,9 +75,8 @@ export function take() {
 }
 
 /**
- * Positions between the rows that begin at `a` and `b`, at `s` from 0 to 1, by the cubic with the velocities of both.
- * If the arm shakes, these velocities would give many turns between two rows. Then the line is straight. @param
- * {number} a @param {number} b @param {number} s @param {Float64Array} position
+ * Positions between the rows that begin at `a` and `b`, at `s` from 0 to 1, by the cubic with the velocities of both. If the arm shakes, these velocities would
+ * give many turns between two rows. Then the line is straight. @param {number} a @param {number} b @param {number} s @param {Float64Array} position
  */
 export function between(a, b, s, position) {
   const { data } = record;
@@ -135,8 +133,7 @@ function rowsOf(columns, first, last) {
   return Array.from({ length: Math.max(0, last - first) }, (_, i) => columns.map((column) => record.data[record.at(first + i) + column]));
 }
 
-/** What a run of the study has, too. */
-const COMPUTED = /^(time|position|velocity|effort|energy)/;
+const COMPUTED = /^(time|position|velocity|effort|energy)/; // what a run of the study has, too
 
 /** The recorded rows up to a time, to be copied; null without a motion. @param {string} name @param {{now: number, span: number}} time [s] */
 export function recorded(name, { now, span }) {

@@ -31,9 +31,8 @@ export async function score(submission) {
 }
 
 /**
- * Starts the kernel, and returns the function that takes frames. Its text is also the worker's script, so it uses
- * nothing outside. @param {BufferSource} bytes @param {number} links @param {number} seed @param {(frame: string) =>
- * void} tell
+ * Starts the kernel, and returns the function that takes frames. Its text is also the worker's script, so it uses nothing outside. @param {BufferSource} bytes
+ * @param {number} links @param {number} seed @param {(frame: string) => void} tell
  */
 async function run(bytes, links, seed, tell) {
   const TICK_MS = 1000 / 60;

@@ -1,19 +1,17 @@
 // Single-key shortcuts, those of the classic pendularm page first, and the overlay that lists them.
 // Invariant: no shortcut acts while the user types, and all can be switched off.
 
-import { resetArm, takeBack } from "./actions.js";
-import { chooseJoint, nudgeSetpoint, switchController } from "./controls.js";
+import { takeBack } from "./actions.js";
+import { chooseMethod, nextJoint, nudgeSetpoint, switchController } from "./controls.js";
 import { announce, byId, el, keepChoice, remembered } from "./dom.js";
 import { METHODS } from "./format.js";
 import { zoomPlots } from "./plots.js";
-import { cancelGoal, setIntegrator } from "./runtime.js";
 import { state, watch } from "./store.js";
-import { push } from "./tasks_panel.js";
-import { setPaused, singleStep, togglePause } from "./transport.js";
+import { cancelTarget, push } from "./tasks_panel.js";
+import { resetNow, setPaused, singleStep, togglePause } from "./transport.js";
 
 const NUDGE = 0.05; // rad, as on the classic page
-/** A held key repeats faster than pushes are sent. */
-const PUSH_MS = 90;
+const PUSH_MS = 90; // a held key repeats faster than pushes are sent
 const SWITCH = "pendularm-shortcuts";
 
 let stoppedByZero = false;
@@ -30,12 +28,12 @@ const shortcuts = [
   ["c", "controller on or off", () => switchController(!state.enabled)],
   ["x", "controller on or off", () => switchController(!state.enabled)],
   ["s", "controller off", () => switchController(false)],
-  ["j", "next joint", () => { chooseJoint(state.joint + 1); announce(`Joint ${state.joint + 1}.`); }],
+  ["j", "next joint", nextJoint],
   [" ", "pause or run", togglePause],
   [".", "single step", singleStep],
-  ["r", "reset", resetArm],
+  ["r", "reset", resetNow],
   ["z", "undo the last change", takeBack],
-  ["g", "cancel the target", cancelGoal],
+  ["g", "cancel the target", cancelTarget],
   ["+", "plots: less time", () => zoomPlots(1)],
   ["-", "plots: more time", () => zoomPlots(-1)],
   ["?", "this list", toggleHelp],
@@ -47,7 +45,7 @@ const actions = new Map(shortcuts.map(([key, , act]) => /** @type {any} */ ([key
 async function useMethod(method, name) {
   const goOn = stoppedByZero;
   stoppedByZero = false;
-  if ((await setIntegrator({ method })).result) announce(`${name}.`);
+  if ((await chooseMethod(method)).result) announce(`${name}.`);
   if (goOn) setPaused(false);
 }
 

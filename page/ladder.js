@@ -8,10 +8,9 @@ import { fromRest, isFree } from "./question.js";
 
 /** @typedef {import("./question.js").Question} Question */
 
-/** The most timesteps in a series, and the shortest one of a usual control period [s]. */
-const MOST = 8;
-const SHORTEST = 1e-4;
-const LEAST = 4;
+const MOST = 8; // the most timesteps in a series
+const SHORTEST = 1e-4; // the shortest one of a usual control period [s]
+const LEAST = 4; // the fewest timesteps
 
 /**
  * Timesteps from long to short, each half of the previous one [s]. All divide the control period, because the effective period would
@@ -28,8 +27,7 @@ export function timestepsFor(period = 0) {
  */
 
 /**
- * All runs, the cheapest first, so the picture grows steadily. @param {number} [period] of the controller [s] @returns {{method:
- * string, timestep: number}[]}
+ * All runs, the cheapest first, so the picture grows steadily. @param {number} [period] of the controller [s] @returns {{method: string, timestep: number}[]}
  */
 export function rungs(period = 0) {
   return timestepsFor(period).flatMap((timestep) => METHODS.map(([method]) => ({ method, timestep })));
@@ -57,8 +55,7 @@ export function read({ method, timestep }, values) {
 
 /** An error below four times its uncertainty is not given. With the uncertainty, and a digit rounded down, it is below this many. */
 const CLEAR = 8;
-/** With a larger uncertainty the reference could not follow the motion [rad]. */
-const FOLLOWED = 1e-3;
+const FOLLOWED = 1e-3; // with a larger uncertainty the reference could not follow the motion [rad]
 
 /** A run's cell in the table: the error of the method, and with a controller the error of the hold. @param {Rung} rung */
 export function errorText({ error, sampling, uncertainty, divergedAt }) {
@@ -136,8 +133,7 @@ export function distances(run, reference) {
   });
 }
 
-/** At a larger distance it is another motion [rad]. */
-const PARTED = 0.1;
+const PARTED = 0.1; // at a larger distance it is another motion [rad]
 
 /** A line of the table. A run is judged only by a reference that lasts as long. @param {Run} run @param {(number | null)[]} away */
 export function describeRun(run, away) {

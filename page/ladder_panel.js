@@ -9,7 +9,7 @@ import { duration, methodName, METHODS, shortName, significant } from "./format.
 import { cheapest, errorText, moveOf, stamp, timestepsFor, uncertaintyOf } from "./ladder.js";
 import { loopKey, questionOf } from "./question.js";
 import { LogScale, powerOfTen } from "./scale.js";
-import { state, watch } from "./store.js";
+import { known, state, unknown, watch } from "./store.js";
 import { Series } from "./study.js";
 import { Surface } from "./surface.js";
 import { colors } from "./theme.js";
@@ -54,11 +54,8 @@ function forget(text) {
 }
 
 async function measure() {
-  const move = presentMove();
-  if (!move || state.connection !== "open") {
-    said.show("There is no arm to measure: not connected.");
-    return;
-  }
+  const move = await known(presentMove);
+  if (!move || state.connection !== "open") return said.show(unknown().status);
   said.show("");
   forget("");
   const length = seconds.number() ?? SECONDS;

@@ -27,8 +27,7 @@ import { startShare, startTabs, startViews } from "./views.js";
 
 /** Interval of plots and trail [ms], all in one frame. The arm itself moves in every frame. */
 const BEAT_MS = 100;
-/** Figures change every few intervals, because faster changes cannot be read. */
-const FIGURES = 2;
+const FIGURES = 2; // figures change every few intervals, because faster changes cannot be read
 const SENTENCE_MS = 1000;
 
 // The token is in a cookie now, which scripts cannot read. So it is removed from the address, and is not in the history or in copied links.

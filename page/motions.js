@@ -21,10 +21,8 @@ export const FAILING = {
   S18: { timestep: 0.001 }, S27: { timestep: 0.05 }, S29: { timestep: 1 },
 };
 
-/** Pictures of a motion. */
-const SAMPLES = 241;
-/** A failing run has at least this many steps, so that its failure shows. */
-const LEAST_STEPS = 24;
+const SAMPLES = 241; // pictures of a motion
+const LEAST_STEPS = 24; // a failing run has at least this many steps, so that its failure shows
 
 /** The correct and the failing run of a scene. @param {Scene} scene @returns {{correct: Wanted, failing: Wanted}} */
 export function motionsOf(scene) {
@@ -55,12 +53,21 @@ export function motionOf({ question, run }, values, isCorrect, playedIn) {
   };
 }
 
-/** Most poses of the past that are drawn behind the present one. */
-const SHADOWS = 6;
+const SHADOWS = 6; // most poses of the past that are drawn behind the present one
 const APART = 4; // samples between them
 
+/**
+ * Plays motions on a surface, from the clock at which they began, in `lasts` [ms] each time; then it shows their ends.
+ * @param {import("./surface.js").Surface} surface @param {Motion[]} motions @param {number} began @param {number} lasts @param {number} [rounds]
+ */
+export function playMotions(surface, motions, began, lasts, rounds = 1) {
+  const part = (performance.now() - began) / lasts;
+  drawMotions(surface, motions, part < rounds ? part % 1 : 1);
+  if (part < rounds && motions.length > 0) requestAnimationFrame(() => surface.redraw());
+}
+
 /** @param {import("./surface.js").Surface} surface @param {Motion[]} motions @param {number} part of the time, from 0 to 1 */
-export function drawMotions({ context, width, height }, motions, part) {
+function drawMotions({ context, width, height }, motions, part) {
   const count = Math.max(...motions.map(({ poses }) => poses.length)); // fewer are those of a run that diverged
   const half = width / motions.length;
   motions.forEach(({ name, note, poses, lengths, color, target }, side) => {

@@ -11,8 +11,7 @@ import { state, watch } from "./store.js";
 import { ENERGIES, PhasePlot, StripChart } from "./strip_chart.js";
 import { Surface } from "./surface.js";
 
-/** Longest shown time of an arm that has diverged, because the divergence is at its end [s]. */
-const BLOW_UP_SECONDS = 2;
+const BLOW_UP_SECONDS = 2; // longest shown time of an arm that has diverged, because the divergence is at its end [s]
 /** The name and the chart of each plot. If its legend has joint values: their column, unit and digits. @type {[string, any, number?, string?, number?][]} */
 const CHARTS = [
   ["position", new StripChart([{ column: POSITION }, { column: SETPOINT, dashed: true }], 0.2, 300), POSITION, "rad", 3],

@@ -6,17 +6,7 @@ import { isFree, loopKey, questionOf, stepsPerUpdate } from "./question.js";
 
 /** @typedef {import("./question.js").Question} Question */
 /** @typedef {import("./question.js").Gains} Gains */
-/**
- * The page's state, as far as a verdict depends on it.
- * @typedef {import("./question.js").Live & {
- *   connection: string, diagnostics: any, limits: Limits, broken: Question | null,
- * }} State
- */
-/**
- * The study's answers about one loop, by method, and the first limit and speed of the motion since the last reset [s, rad/s].
- * @typedef {{loop: string, answers: Record<string, any>, motions: Record<string, {limit: number, speed?: number}>}} Limits
- */
-
+/** @typedef {import("./question.js").Live} State */
 /** @typedef {"offline" | "diverged" | "unknown" | "never" | "beyond" | "here" | "stable"} Kind */
 /**
  * @typedef {object} Verdict
@@ -31,12 +21,9 @@ import { isFree, loopKey, questionOf, stepsPerUpdate } from "./question.js";
 
 /** Below this real-time factor the runtime is too slow. */
 export const SLOW = 0.95;
-/** Advised share of a limit, as in the runtime. */
-const SHARE = 0.8;
-/** Advised share of a timestep at which the arm diverged below every known limit. */
-const AFTER_DIVERGENCE = 0.5;
-/** If the energy of a free swing takes longer to double, other errors matter first [s]. */
-const SLOW_GROWTH = 600;
+const SHARE = 0.8; // advised share of a limit, as in the runtime
+const AFTER_DIVERGENCE = 0.5; // advised share of a timestep at which the arm diverged below every known limit
+const SLOW_GROWTH = 600; // if the energy of a free swing takes longer to double, other errors matter first [s]
 const HALVINGS = 50;
 
 /** The study's answer for a method, if it belongs to the active loop; otherwise null. @param {State} state */
@@ -45,8 +32,7 @@ export function answerInForce(state, method = state.integrator?.method ?? "") {
   return asked && state.limits.loop === loopKey(asked) ? state.limits.answers[method] ?? null : null;
 }
 
-/** Relative changes of a limit that are ignored. */
-const NEWS = 0.05;
+const NEWS = 0.05; // relative changes of a limit that are ignored
 
 /** Whether the limit of the motion has changed since the last request to the study. It changes as the arm moves. */
 export function motionHasChanged(/** @type {any} */ answer, /** @type {any} */ diagnostics) {
@@ -216,40 +202,24 @@ export function verdict(state) {
   const now = state.integrator?.timestep ?? NaN;
   const present = timestep > 0 ? Math.min(timestep, now) : now;
   const offered = !slow && own.advised > 0 && own.advised < present ? own.advised : NaN;
-  const known = { limit, where, advised: offered, slow };
+  const said = (/** @type {Kind} */ kind, /** @type {string} */ pill, sentence = "") => ({ kind, pill, sentence, limit, where, advised: offered, slow });
   const at = slow ? `A control period of ${duration(time)}` : duration(time);
   const name = slow ? "the limit" : own.name;
-  const above = excess(at, time, `${name} ${duration(limit)}`, limit, where);
-  if (state.connection !== "open") return { kind: "offline", pill: "no connection", sentence: "", ...known };
+  const above = limit > 0 ? `${at} is above ${name} ${duration(limit)}, ${where}.` : `No stable timestep is known, ${where}.`;
+  if (state.connection !== "open") return said("offline", "no connection");
   if (state.diagnostics?.state === "diverged") {
-    const sentence = !integrator ? (state.broken ? "Other settings are in force now." : "") : above || (limit > 0 ? `${at} was too long for this motion.` : "");
-    return { kind: "diverged", pill: "diverged", sentence, ...known };
+    const other = state.broken ? "Other settings are in force now." : "";
+    return said("diverged", "diverged", !integrator ? other : time > limit ? above : limit > 0 ? `${at} was too long for this motion.` : "");
   }
-  if (Number.isNaN(limit) || Number.isNaN(timestep)) return { kind: "unknown", pill: "limit unknown", sentence: "", ...known };
-  if (time > limit) {
-    return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? `beyond ${name}` : "no stable timestep", sentence: above, ...known };
-  }
+  if (Number.isNaN(limit) || Number.isNaN(timestep)) return said("unknown", "limit unknown");
+  if (time > limit) return limit > 0 ? said("beyond", `beyond ${name}`, above) : said("never", "no stable timestep", above);
   if (time > everyPose) {
     const others = everyPose > 0
       ? `other poses are stable only up to ${duration(everyPose)}: on the way there the arm may shake`
       : "for other poses no stable timestep is known, because of the gains";
-    const sentence = `${at} is stable ${where}, but ${others}.`;
-    return { kind: "here", pill: "stable here only", sentence, ...known };
+    return said("here", "stable here only", `${at} is stable ${where}, but ${others}.`);
   }
-  const sentence = limit === Infinity ? `No limit was found, ${where}.` : `${at} is within the limit ${duration(limit)}, ${where}.`;
-  return { kind: "stable", pill: "stable", sentence, ...known };
-}
-
-/**
- * Why a time is too long; empty if it is not.
- * @param {string} at the text of the time @param {number} time @param {string} named the limit in words @param {number} limit
- * @param {string} where
- */
-function excess(at, time, named, limit, where) {
-  if (!(time > limit)) return "";
-  return limit > 0
-    ? `${at} is above ${named}, ${where}.`
-    : `No stable timestep is known, ${where}.`;
+  return said("stable", "stable", limit === Infinity ? `No limit was found, ${where}.` : `${at} is within the limit ${duration(limit)}, ${where}.`);
 }
 
 /** @param {number} limit */
@@ -277,12 +247,9 @@ function afterReset(answer) {
 
 /** @typedef {Record<string, number>} Timesteps largest stable timestep of each method [s] */
 
-/** Limits within this factor count as equal. */
-const ALIKE = 1.15;
-/** The study computes growth at this multiple of the limit. */
-const BEYOND = 1.1;
-/** Steps in one period of a deviation that changes its sign at every step. */
-const FLIP = 2;
+const ALIKE = 1.15; // limits within this factor count as equal
+const BEYOND = 1.1; // the study computes growth at this multiple of the limit
+const FLIP = 2; // steps in one period of a deviation that changes its sign at every step
 const NEARLY = 0.99;
 
 /** The reason for the limit of the present method; empty until the limits of all methods are known. */
@@ -345,8 +312,7 @@ export function scaled(gains, factor) {
   return { kp: times(gains.kp), ki: times(gains.ki), kd: times(gains.kd) };
 }
 
-/** Gains are sent with three digits. */
-const ROUNDED = 0.02;
+const ROUNDED = 0.02; // gains are sent with three digits
 
 /** The factor between `gains` and `base`; NaN if they are not a multiple. @param {Gains | null} gains @param {Gains | null} base */
 export function factorOf(gains, base) {

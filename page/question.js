@@ -5,20 +5,7 @@
 /** @typedef {{kp: number[], ki: number[], kd: number[]}} Gains */
 /** @typedef {{effort: number[] | null, anti_windup: string, tracking_time: number}} Motors limits of the efforts [N m], and the anti-windup */
 /** @typedef {{encoder_step: number[], velocity: string, delay: number}} Sensors what the controller measures [rad], and its delay [periods] */
-/**
- * What the page knows of the live arm.
- * @typedef {object} Live
- * @property {number} links
- * @property {Arm | null} params
- * @property {Gains | null} gains
- * @property {{method: string, timestep: number} | null} integrator
- * @property {Motors | null} [motors] @property {{viscous: number[]} | null} [friction]
- * @property {Sensors | null} [sensors]
- * @property {{period: number, delay: boolean, effective_period?: number} | null} period
- * @property {boolean | null} enabled whether the controller is on
- * @property {Float64Array} setpoint @property {boolean} setpointKnown
- * @property {Float64Array} position @property {Float64Array} velocity
- */
+/** @typedef {typeof import("./store.js").state} Live what the page knows of the live arm */
 /**
  * @typedef {object} Question
  * @property {Arm} params
@@ -77,6 +64,11 @@ export function loopKey({ integrator: _, timestep: __, q: ___, qd: ____, ...loop
 /** Timesteps per control update, as in the runtime: at least 1. @param {Pick<Live, "period" | "integrator">} live */
 export function stepsPerUpdate({ period, integrator }) {
   return Math.max(1, Math.round((period?.period ?? 0) / (integrator?.timestep ?? NaN)) || 1);
+}
+
+/** The time for which a torque is held [s]: the steps between two runs of the control law. @param {Pick<Live, "period" | "integrator">} live */
+export function heldTime(live) {
+  return live.integrator ? stepsPerUpdate(live) * live.integrator.timestep : NaN;
 }
 
 /**

@@ -4,95 +4,89 @@
 import { byId, el } from "./dom.js";
 import { refusal } from "./field.js";
 import { gravityLoad } from "./mechanics.js";
-import { setFriction, setMotors, setSensors } from "./runtime.js";
+import { change } from "./runtime.js";
 import { state, watch } from "./store.js";
 
 /** A first limit is this multiple of the weight of the stretched arm, so it holds the arm and saturates in a move. */
 const MARGIN = 1.5;
-/** The first limit without a weight [N m]. */
-const LEAST = 5;
+const LEAST = 5; // the first limit without a weight [N m]
 const CURES = { clamp: "bound of 50 rad s", none: "none", conditional: "conditional integration", back_calculation: "back-calculation" };
 
-/** The bits of encoders on offer: counts of a turn are a power of two. The first one is that of a cheap magnetic encoder. */
-const BITS = [12, 10, 11, 14, 16, 18, 20];
+/** The bits of encoders on offer: counts of a turn are a power of two. The first switching on takes those of a cheap magnetic encoder. */
+const BITS = [10, 11, 12, 14, 16, 18, 20];
+const CHEAP = 12;
 const EXACT = "exact";
+const MOST_DELAY = 16; // periods
 
-/** The first friction [N m s/rad]. */
-const SOME = 1;
+const SOME = 1; // the first friction [N m s/rad]
 
-/** @param {string} id @param {string} name @param {() => void} onclick */
-function switchOf(id, name, onclick) {
-  return el("button", { type: "button", class: "switch", id, role: "switch", onclick },
-    el("span", { class: "knob", "aria-hidden": "true" }), el("span", {}, name));
-}
+/** The limits at the last switching off. @type {number[] | null} */
+let before = null;
+
+/**
+ * The label of a list, its values with their texts, the present value, and the settings of a chosen one.
+ * @typedef {[string, string[][], (present: any) => any, (value: any) => object]} List
+ */
+/**
+ * Each kind, the first part of the ids of its elements: its group of settings, its name, whether it is on, the settings of its switch, its lists.
+ * @type {{id: string, group: string, name: string, isOn: (present: any) => boolean, turned: (on: boolean) => object, lists: List[]}[]}
+ */
+const KINDS = [
+  {
+    id: "limit", group: "motors", name: "Effort limit", isOn: ({ effort }) => effort !== null,
+    turned(on) {
+      if (!on) before = state.motors.effort;
+      return { effort: !on ? null : before?.length === state.links ? before : firstLimits() };
+    },
+    lists: [["anti-windup", Object.entries(CURES), ({ anti_windup }) => anti_windup, (anti_windup) => ({ anti_windup })]],
+  },
+  {
+    id: "friction", group: "friction", name: "Friction", isOn: ({ viscous }) => viscous.some((one) => one > 0),
+    turned: (on) => ({ viscous: ofEach(on ? SOME : 0) }), lists: [],
+  },
+  {
+    id: "sensors", group: "sensors", name: "Sensors",
+    isOn: ({ encoder_step, velocity, delay }) => encoder_step.some((one) => one > 0) || velocity !== EXACT || delay > 0,
+    turned: (on) => (on ? { encoder_step: ofEach(stepOf(CHEAP)), velocity: "difference" } : { encoder_step: ofEach(0), velocity: EXACT, delay: 0 }),
+    lists: [
+      ["encoder", [[EXACT, EXACT], ...BITS.map((one) => [String(one), `${one} bits`])], ({ encoder_step: [step] }) => (step === 0 ? EXACT
+        : BITS.find((one) => Math.abs(stepOf(one) - step) < 1e-12) ?? ""), (value) => ({ encoder_step: ofEach(value === EXACT ? 0 : stepOf(Number(value))) })],
+      ["velocity", [[EXACT, EXACT], ["difference", "difference"]], ({ velocity }) => velocity, (velocity) => ({ velocity })],
+      ["delay [periods]", Array.from({ length: MOST_DELAY + 1 }, (_, one) => [String(one), String(one)]), ({ delay }) => delay,
+        (value) => ({ delay: Number(value) })],
+    ],
+  },
+];
 
 export function startRealism() {
-  const limited = switchOf("limit-switch", "Effort limit", () => said.report(switchLimit()));
-  const rubbed = switchOf("friction-switch", "Friction", () => said.report(switchFriction()));
-  const cure = el("select", { onchange: () => said.report(setMotors({ anti_windup: cure.value })) },
-    ...Object.entries(CURES).map(([value, text]) => el("option", { value }, text)));
-  const sensing = switchOf("sensors-switch", "Sensors", () => said.report(switchSensors()));
-  const bits = chosen([[EXACT, EXACT], ...BITS.toSorted((one, other) => one - other).map((one) => [String(one), `${one} bits`])],
-    (value) => setSensors({ encoder_step: steps(value === EXACT ? 0 : stepOf(Number(value))) }));
-  const speed = chosen([["exact", "exact"], ["difference", "difference"]], (velocity) => setSensors({ velocity }));
-  const delay = chosen(Array.from({ length: 17 }, (_, periods) => [String(periods), String(periods)]), (value) => setSensors({ delay: Number(value) }));
-  const said = refusal(limited, rubbed, sensing, cure, bits, speed, delay);
-  byId("realism-switches").append(limited, rubbed, sensing);
-  for (const [name, one] of /** @type {[string, HTMLElement][]} */ ([["encoder", bits], ["velocity", speed], ["delay [periods]", delay]])) {
-    byId("sensors-options").append(el("label", { class: "option" }, el("span", {}, name), one));
+  const controls = KINDS.flatMap(startKind);
+  const said = refusal(...controls);
+  byId("realism-switches").after(said.element);
+  watch(["motors", "friction", "sensors"], () => { byId("realism").hidden = KINDS.every(({ group }) => state[group] === null); });
+
+  /** @param {(typeof KINDS)[number]} kind @returns {HTMLElement[]} its switch and lists */
+  function startKind({ id, group, name, isOn, turned, lists }) {
+    // A list shows the present value again after a refusal.
+    const send = (settings) => said.report(change(group, settings)).then(show);
+    const button = el("button", { type: "button", class: "switch", id: `${id}-switch`, role: "switch", onclick: () => send(turned(!isOn(state[group]))) },
+      el("span", { class: "knob", "aria-hidden": "true" }), el("span", {}, name));
+    byId("realism-switches").append(button);
+    const made = lists.map(([label, options, , settings]) => {
+      const list = el("select", { onchange: () => send(settings(list.value)) }, ...options.map(([value, text]) => el("option", { value }, text)));
+      byId(`${id}-options`).append(el("label", { class: "option" }, el("span", {}, label), list));
+      return list;
+    });
+    const show = () => {
+      const present = state[group];
+      button.hidden = present === null;
+      const on = present !== null && isOn(present);
+      byId(`${id}-parts`).hidden = !on;
+      button.setAttribute("aria-checked", String(on));
+      if (present) lists.forEach(([, , valueOf], i) => { made[i].value = String(valueOf(present)); });
+    };
+    watch([group, "links"], show);
+    return [button, ...made];
   }
-  /** A list that sends the chosen value. @param {string[][]} options @param {(value: string) => any} send @returns {HTMLSelectElement} */
-  function chosen(options, send) {
-    const list = el("select", { onchange: () => said.report(send(list.value)) }, ...options.map(([value, text]) => el("option", { value }, text)));
-    return list;
-  }
-  byId("limit-options").append(el("label", { class: "option" }, el("span", {}, "anti-windup"), cure), said.element);
-  watch(["motors", "links"], () => {
-    const { motors } = state;
-    byId("realism").hidden = motors === null;
-    if (!motors) return;
-    const isOn = motors.effort !== null;
-    limited.setAttribute("aria-checked", String(isOn));
-    byId("limit-options").hidden = byId("limit-fields").hidden = byId("limit-text").hidden = !isOn;
-    cure.value = motors.anti_windup;
-  });
-  watch(["friction", "links"], () => {
-    const { friction } = state;
-    rubbed.hidden = friction === null;
-    if (!friction) return;
-    const isOn = friction.viscous.some((one) => one > 0);
-    rubbed.setAttribute("aria-checked", String(isOn));
-    byId("friction-fields").hidden = byId("friction-text").hidden = !isOn;
-  });
-  watch(["sensors", "links"], () => {
-    const { sensors } = state;
-    sensing.hidden = sensors === null;
-    byId("sensors-options").hidden = byId("sensors-text").hidden = !sensors || !isReal(sensors);
-    if (!sensors) return;
-    sensing.setAttribute("aria-checked", String(isReal(sensors)));
-    const shown = BITS.find((one) => Math.abs(stepOf(one) - sensors.encoder_step[0]) < 1e-12);
-    bits.value = sensors.encoder_step[0] === 0 ? EXACT : String(shown ?? "");
-    speed.value = sensors.velocity;
-    delay.value = String(sensors.delay);
-  });
-}
-
-let before = /** @type {number[] | null} */ (null); // the limits at the last switching off
-
-function switchLimit() {
-  const { motors, links } = state;
-  if (motors?.effort) before = motors.effort;
-  return setMotors({ effort: motors?.effort ? null : before?.length === links ? before : firstLimits() });
-}
-
-function switchFriction() {
-  const isOn = state.friction?.viscous.some((/** @type {number} */ one) => one > 0);
-  return setFriction({ viscous: new Array(state.links).fill(isOn ? 0 : SOME) });
-}
-
-/** @param {import("./question.js").Sensors} sensors */
-function isReal({ encoder_step, velocity, delay }) {
-  return encoder_step.some((one) => one > 0) || velocity !== "exact" || delay > 0;
 }
 
 /** The step of an encoder with this number of bits [rad]. @param {number} bits */
@@ -100,14 +94,9 @@ function stepOf(bits) {
   return (2 * Math.PI) / 2 ** bits;
 }
 
-/** @param {number} step [rad] @returns {number[]} */
-function steps(step) {
-  return new Array(state.links).fill(step);
-}
-
-function switchSensors() {
-  const isOn = state.sensors !== null && isReal(state.sensors);
-  return setSensors(isOn ? { encoder_step: steps(0), velocity: "exact", delay: 0 } : { encoder_step: steps(stepOf(BITS[0])), velocity: "difference" });
+/** The same value for each joint. @param {number} value @returns {number[]} */
+function ofEach(value) {
+  return new Array(state.links).fill(value);
 }
 
 /** @returns {number[]} [N m] */

@@ -14,10 +14,8 @@ import { rolloutArgs } from "./question.js";
 
 /** Length of a response [s]. */
 export const LASTS = 5;
-/** Responses that are kept. */
-const MOST = 4;
-/** Smaller overshoots and errors are not seen [rad]. */
-const SMALL = 0.02;
+const MOST = 4; // responses that are kept
+const SMALL = 0.02; // smaller overshoots and errors are not seen [rad]
 const LARGE = 0.05;
 
 /** The present motion of the first joint since the reset: pairs of time [s] and angle [rad]. The reset itself is in another pose. */

@@ -4,8 +4,7 @@
 const FIRST_RETRY_MS = 300;
 const LAST_RETRY_MS = 4000;
 const CALL_TIMEOUT_MS = 15000;
-/** Most calls that wait for an answer, so that memory is bounded without answers. */
-const MOST_CALLS = 256;
+const MOST_CALLS = 256; // most calls that wait for an answer, so that memory is bounded without answers
 
 /** The address of the runtime's WebSocket: the folder of the page, which a proxy may serve under a path. @param {string} page its address */
 export function socketAddress(page) {

@@ -8,20 +8,15 @@ import { latestOnly } from "./latest.js";
 import { answerInForce, keepAnswer, motionHasChanged } from "./policy.js";
 import { gainsArgs, loopKey, questionOf, rolloutArgs, stabilityArgs } from "./question.js";
 import { Rosbridge, socketAddress } from "./rosbridge.js";
-import { MOST_LINKS, nothingAsked, set, state, tell, watch } from "./store.js";
+import { known, MOST_LINKS, nothingAsked, set, settingsKnown, state, tell, watch } from "./store.js";
 
-/** Other clients change settings too, and no topic reports it. */
-const POLL_MS = 1000;
+const POLL_MS = 1000; // other clients change settings too, and no topic reports it
 /** A more recent trajectory is newer than the setpoint in other messages. The next diagnostics are correct again. */
 const TRAJECTORY_MS = 400;
-/** A paused arm needs few joint states [ms between two]. */
-const STILL_MS = 1000;
-/** A hidden page needs more, because they are recorded and must show a swing later. */
-const HIDDEN_MS = 100;
-/** After a change of a paused arm by this page, all joint states arrive for this time [ms]. */
-const TOUCHED_MS = 300;
-/** Time for a computation or a search [ms]. */
-const LONG_CALL_MS = 120000;
+const STILL_MS = 1000; // a paused arm needs few joint states [ms between two]
+const HIDDEN_MS = 100; // a hidden page needs more, because they are recorded and must show a swing later
+const TOUCHED_MS = 300; // after a change of a paused arm by this page, all joint states arrive for this time [ms]
+const LONG_CALL_MS = 120000; // time for a computation or a search [ms]
 /** A runtime that sends nothing for this time does not answer. It sends diagnostics once a second [ms]. */
 const SILENT_MS = 3000;
 /** Many setpoints may arrive per second. The study is asked about the latest. */
@@ -89,6 +84,7 @@ function connection(now) {
   if (now === "open") {
     // It may be another or a restarted runtime, so all old values are discarded.
     state.setpointKnown = false;
+    set("answered", false);
     set("limits", nothingAsked());
     set("diagnostics", null);
     set("goal", null);
@@ -226,7 +222,7 @@ function poll() {
   pause();
   const last = enable();
   askStability();
-  return last;
+  return last.then(() => keep("answered", true));
 }
 
 /** The service of each group of settings, in the order in which they are set. @type {Record<string, string>} */
@@ -238,11 +234,24 @@ export const GROUPS = Object.keys(SERVICES);
 /** The delay is a value of two groups, so a change of one asks for the other. @type {Record<string, string>} */
 const OTHER = { period: "sensors", sensors: "period" };
 
+/** A change by this page. All settings must be known before it, because it can be undone. */
+async function changing(call) {
+  await known(settingsKnown);
+  beforeChange();
+  set("changing", state.changing + 1);
+  const answer = await call();
+  set("changing", state.changing - 1);
+  return answer;
+}
+
 /** Changes settings of a group, or reads them without `args`. @param {string} group @param {Record<string, any>} args */
 export async function change(group, args) {
-  if (Object.keys(args).length > 0) beforeChange();
-  const answer = await bridge.call(SERVICES[group], args);
-  if (Object.keys(answer.values).length > 0) keep(group, answer.values);
+  const call = async () => {
+    const told = await bridge.call(SERVICES[group], args);
+    if (Object.keys(told.values).length > 0) keep(group, told.values);
+    return told;
+  };
+  const answer = await (Object.keys(args).length > 0 ? changing(call) : call());
   if (args.delay !== undefined) await change(OTHER[group], {});
   return answer;
 }
@@ -259,8 +268,8 @@ export const pause = (data) => flip("/arm_sim/pause", "paused", data);
 
 /** Switches the controller. @param {boolean} [data] */
 export function enable(data) {
-  if (data !== undefined) beforeChange();
-  return flip("/pid_controller/enable", "enabled", data);
+  const call = () => flip("/pid_controller/enable", "enabled", data);
+  return data === undefined ? call() : changing(call);
 }
 
 /** Stores `value` under `key`, and notifies only if it differs. */
@@ -268,14 +277,6 @@ function keep(key, value) {
   if (JSON.stringify(state[key]) !== JSON.stringify(value)) set(key, value);
 }
 
-const changing = (/** @type {string} */ group) => (/** @type {Record<string, any>} */ args) => change(group, args);
-export const setParams = changing("params");
-export const setGains = changing("gains");
-export const setIntegrator = changing("integrator");
-export const setPeriod = changing("period");
-export const setFriction = changing("friction");
-export const setMotors = changing("motors");
-export const setSensors = changing("sensors");
 export const disturb = (effort, seconds) => bridge.call("/arm_sim/disturb", { effort, duration: seconds });
 export const solve = (target) => bridge.call("/ik/solve", target);
 export const cancelGoal = () => bridge.call("/ik_action/cancel_goal");
@@ -334,8 +335,9 @@ export async function sendGoal(args) {
   return answer;
 }
 
-/** Sends `positions` [rad] as the setpoint. It arrives on the topic, like every client's. */
+/** Sends `positions` [rad] as the setpoint. It arrives on the topic, like every client's. A message has no answer, so only a missing connection is refused. */
 export function sendSetpoint(positions) {
+  if (!bridge.open) return { result: false, status: "not connected", values: {} };
   beforeChange();
   const names = Array.from({ length: state.links }, (_, i) => `joint${i + 1}`);
   bridge.publish("/joint_trajectory", {
@@ -343,6 +345,7 @@ export function sendSetpoint(positions) {
     joint_names: names,
     points: [{ positions, velocities: [], accelerations: [], time_from_start: { sec: 0, nanosec: 0 } }],
   });
+  return { result: true, status: "", values: {} };
 }
 
 /** Asks about the active loop with each method, the present one first. Computing takes time, so only the newest loop counts. */

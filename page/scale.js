@@ -11,8 +11,7 @@ const LARGEST = 1e150;
 const MOST_MARKS = 12;
 /** The end of a logarithmic scale. Growth up to it is visible, and larger values need no distinction. */
 export const LOG_END = 1e12;
-/** Decades of a logarithmic scale for one mark. */
-const DECADES_A_MARK = [1, 2, 3, 4, 6, 12];
+const DECADES_A_MARK = [1, 2, 3, 4, 6, 12]; // decades of a logarithmic scale for one mark
 
 /** log10 on both sides of zero, linear below 1. @param {number} value */
 export function symmetricLog(value) {

@@ -20,10 +20,8 @@ import { exact } from "./format.js";
  * @property {{position?: number[], velocity?: number[]} | null} [start] the start of the arm [rad, rad/s]; only in links
  */
 
-/** Changes that can be undone. */
-const MOST_STEPS = 100;
-/** Changes within this time count as one, because a slider passes through many values [ms]. */
-const ONE_CHANGE_MS = 1000;
+const MOST_STEPS = 100; // changes that can be undone
+const ONE_CHANGE_MS = 1000; // changes within this time count as one, because a slider passes through many values [ms]
 
 /** The runtime's default settings, by number of links. A test compares them with the runtime. @type {Record<number, Settings>} */
 export const DEFAULTS = {

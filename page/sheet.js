@@ -11,11 +11,9 @@ import { rollout, stability } from "./runtime.js";
 import { DEFAULTS, toFragment } from "./settings.js";
 import { state } from "./store.js";
 
-/** The move with the error on the sheet: its duration [s], and its timestep and control period [s]. */
-const MOVE = 2;
-const AT = 0.001;
-/** Times at which the error is measured; the largest counts. */
-const SAMPLES = 101;
+const MOVE = 2; // duration of the move with the error on the sheet [s]
+const AT = 0.001; // its timestep and control period [s]
+const SAMPLES = 101; // times at which the error is measured; the largest counts
 
 /** @type {[string, string][]} */
 const LISTS = [["masses", "mass [kg]"], ["lengths", "length [m]"], ["kp", "kp [N m/rad]"], ["ki", "ki [N m/(rad s)]"], ["kd", "kd [N m s/rad]"]];

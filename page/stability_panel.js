@@ -9,44 +9,43 @@ import { Chart, drawBars, drawMap } from "./chart.js";
 import { copyable } from "./copy.js";
 import { shrinks } from "./course.js";
 import { byId, el, setText } from "./dom.js";
+import { refusal } from "./field.js";
 import { duration, methodName, METHODS } from "./format.js";
 import { robotForm } from "./held_limit.js";
 import { latestOnly } from "./latest.js";
 import { answerInForce, factorOf, limitInForce, limitText, scaled, whyText } from "./policy.js";
-import { fromRest, isFree, questionOf, stabilityArgs, stepsPerUpdate } from "./question.js";
-import { setGains, setIntegrator, setPeriod } from "./runtime.js";
+import { fromRest, heldTime, isFree, questionOf, stepsPerUpdate } from "./question.js";
+import { change } from "./runtime.js";
 import { LogScale } from "./scale.js";
-import { LOOP, state, watch } from "./store.js";
-import { climbRows, deviation, limitsContent, LOOKS } from "./study.js";
+import { known, LOOP, settingsKnown, state, unknown, watch } from "./store.js";
+import { Border, deviation, LOOKS } from "./study.js";
 import { Surface } from "./surface.js";
 import { openTab } from "./views.js";
 
 const ROWS = 17; // rows of gains with limits, the present ones in the middle
-/** Largest and smallest multiple of the present gains. */
-const WIDEST = 16;
+const WIDEST = 16; // largest and smallest multiple of the present gains
 const FINE = 1.1; // one arrow key
 
 const factors = new LogScale(1 / WIDEST, WIDEST, [1 / 16, 1 / 4, 1, 4, 16].map((one) => [one, one < 1 ? `1/${1 / one}` : `${one}×`]));
-/** The held time [s]. */
-const times = new LogScale(1e-4, 0.1);
+const times = new LogScale(1e-4, 0.1); // the held time [s]
 
 let map;
-let chart;
-let mapAsked = ""; // the settings of `rows`
-/** Limits with a hold and with control in every stage [s], as far as they are known. @type {import("./chart.js").Row[]} */
-let rows = [];
-let asked; // the question of a row
+let said;
+const border = new Border(factors, ROWS, () => map.redraw());
 let anchor = /** @type {import("./question.js").Gains | null} */ (null); // as `baseGains` left it
+let wish = /** @type {{time: number, factor: number} | null} */ (null); // the chosen point, until the runtime has answered
 
 export function startStability() {
   startLimits();
   byId("stability").append(robotForm());
   const canvas = byId("map");
   map = new Surface(canvas, drawStability);
+  said = refusal(canvas);
+  byId("map-text").after(said.element);
   watch(["integrator", "gains", "params", "period", "setpoint", "limits", "enabled", "tab", "links"], () => map.redraw());
   canvas.addEventListener("click", (event) => goTo(event.offsetX, event.offsetY));
   canvas.addEventListener("keydown", byArrows);
-  copyable(canvas.previousElementSibling, () => limitsContent("Where the loop is stable", rows, (factor) => stabilityArgs(asked(factor))));
+  copyable(canvas.previousElementSibling, () => border.content("Where the loop is stable"));
   copyable(byId("push-bars").previousElementSibling, () => pushed);
   bars = new Surface(byId("push-bars"), (surface) => drawBars(surface, heights, state.enabled ? "measurement of the controller" : "step"));
   watch([...LOOP, "tab", "view"], lookAtPush);
@@ -57,55 +56,39 @@ function isSampled() {
   return state.integrator && stepsPerUpdate(state) > 1;
 }
 
-/** The time for which a torque is held [s]. */
-function held() {
-  return state.integrator ? stepsPerUpdate(state) * state.integrator.timestep : NaN;
-}
-
 /** The base gains of the map's scale. They do not change while the arm's gains are a multiple of them, so the dot moves and the border stays. */
 function baseGains() {
   if (!(factorOf(state.gains, anchor) > 0)) anchor = state.gains;
   return anchor;
 }
 
-/** The question of the border, at the base gains: that of the loop once the controller is on. The timestep does not move the border. */
-function borderQuestion() {
+/** Asks for the border of the loop once the controller is on. The timestep does not move it. */
+function askBorder() {
   const question = questionOf({ ...state, enabled: true });
-  if (!question) return null;
-  return { ...question, gains: baseGains(), control_period: 0, timestep: 0.001, q: question.setpoint, qd: question.qd.map(() => 0) };
+  if (!question) return;
+  const base = baseGains();
+  const common = { ...question, control_period: 0, timestep: 0.001, q: question.setpoint, qd: question.qd.map(() => 0) };
+  border.ask((factor) => ({ ...common, gains: scaled(base, factor) }), isSampled() ? { limit: "control_period_limit" }
+    : { limit: "timestep_limit_held", continuous: "timestep_limit_continuous" });
 }
 
-/** Asks the study for the border. A new request ends the old one. */
-async function askBorder() {
-  const question = borderQuestion();
-  if (!question) return;
-  const sampled = isSampled();
-  const key = JSON.stringify([question, sampled]);
-  if (key === mapAsked) return;
-  mapAsked = key;
-  rows = [];
-  asked = (factor) => ({ ...question, gains: scaled(question.gains, factor) });
-  await climbRows(factors, ROWS, asked, () => mapAsked === key, (factor, values) => {
-    rows.push(sampled ? { factor, limit: values.control_period_limit ?? Infinity }
-      : { factor, limit: values.timestep_limit_held ?? Infinity, continuous: values.timestep_limit_continuous ?? Infinity });
-    map.redraw();
-  });
-  if (mapAsked === key && rows.length < ROWS) mapAsked = ""; // asked again at the next message
+function chartOf(surface) {
+  return new Chart(surface, times, factors, { right: 10, top: 8, bottom: 36 });
 }
 
 function drawStability() {
   askBorder();
-  chart = new Chart(map, times, factors, { right: 10, top: 8, bottom: 36 });
+  const chart = chartOf(map);
   chart.frame({ across: isSampled() ? "control period" : "timestep", grid: false });
   const factor = factorOf(state.gains, baseGains());
-  if (state.integrator && state.gains) drawMap(chart, rows, held(), factor > 0 ? factor : 1);
+  if (state.integrator && state.gains) drawMap(chart, border.rows, heldTime(state), factor > 0 ? factor : 1);
   describeMap();
 }
 
 function describeMap() {
-  const row = rows[Math.round(factors.place(factorOf(state.gains, baseGains())) * (ROWS - 1))];
+  const row = border.rows[Math.round(factors.place(factorOf(state.gains, baseGains())) * (ROWS - 1))];
   if (!row || !state.integrator) return;
-  setText(byId("map-value"), `at ${duration(held())}`);
+  setText(byId("map-value"), `at ${duration(heldTime(state))}`);
   const lines = isSampled() ? `Line: limit of the control period, ${limitText(row.limit)} with these gains.`
     : `Solid line: limit of ${methodName(state.integrator.method)}, ${limitText(row.limit)} with these gains, for a controller that acts at every step. `
       + `Dashed line: limit of a controller without a hold, ${limitText(row.continuous)}.`;
@@ -114,30 +97,43 @@ function describeMap() {
 }
 
 function goTo(left, top) {
-  if (!state.integrator || !state.gains || !chart) return;
+  const chart = chartOf(map);
   const place = (left - chart.left) / (chart.right - chart.left);
   const rise = (chart.bottom - top) / (chart.bottom - chart.top);
   if (place < 0 || place > 1 || rise < 0 || rise > 1) return;
-  moveTo(times.value(place), factors.value(rise));
-}
-
-/** A diverged arm restarts there, because otherwise the new settings would show no effect. */
-async function moveTo(time, factor) {
-  const short = (value) => Number(value.toPrecision(3));
-  const gains = scaled(baseGains(), factor);
-  const changes = [];
-  const isNewGain = Math.abs(Math.log(factor / factorOf(state.gains, baseGains()))) > 0.02;
-  if (isNewGain) changes.push(setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) }));
-  if (time !== held()) changes.push(isSampled() ? setPeriod({ period: short(time) }) : setIntegrator({ timestep: short(time) }));
-  await Promise.all(changes);
-  if (state.diverged) beginAnew();
+  moveTo(() => ({ time: times.value(place), factor: factors.value(rise) }));
 }
 
 function byArrows(event) {
   const step = { ArrowLeft: [1 / FINE, 1], ArrowRight: [FINE, 1], ArrowUp: [1, FINE], ArrowDown: [1, 1 / FINE] }[event.key];
-  if (!step || !state.integrator || !state.gains) return;
+  if (!step) return;
   event.preventDefault();
-  moveTo(times.moved(held(), step[0]), factors.moved(factorOf(state.gains, baseGains()), step[1]));
+  moveTo(({ time, factor }) => ({ time: times.moved(time, step[0]), factor: factors.moved(factor, step[1]) }));
+}
+
+/**
+ * Moves the dot to another point once the settings are known. A held key repeats faster than the runtime answers, so it moves on from the last chosen
+ * point. A diverged arm restarts there, because otherwise the new settings would show no effect.
+ * @param {(point: {time: number, factor: number}) => {time: number, factor: number}} next
+ */
+async function moveTo(next) {
+  if (await known(settingsKnown) === null) return said.show(unknown().status);
+  const present = factorOf(state.gains, baseGains());
+  const point = next(wish ?? { time: heldTime(state), factor: present });
+  wish = point;
+  const short = (value) => Number(value.toPrecision(3));
+  const changes = [];
+  if (Math.abs(Math.log(point.factor / present)) > 0.02) {
+    const gains = Object.entries(scaled(baseGains(), point.factor)).map(([key, values]) => [key, values.map(short)]);
+    changes.push(change("gains", Object.fromEntries(gains)));
+  }
+  if (point.time !== heldTime(state)) {
+    changes.push(isSampled() ? change("period", { period: short(point.time) }) : change("integrator", { timestep: short(point.time) }));
+  }
+  const answers = await Promise.all(changes);
+  if (wish === point) wish = null;
+  said.show(answers.find(({ result }) => !result)?.status ?? "");
+  if (state.diverged) beginAnew();
 }
 
 const ASK_MS = 60;

@@ -30,8 +30,7 @@ function extent(columns, first, last) {
   return [min, max];
 }
 
-/** Space for the name of a line [px]. */
-const NAME = 64;
+const NAME = 64; // space for the name of a line [px]
 
 export class StripChart {
   /** @param {Series[]} series @param {number} least smallest span of the vertical axis @param {number} sane beyond it the scale is logarithmic */
@@ -97,10 +96,8 @@ export class StripChart {
   }
 }
 
-/** The number of pieces of the path, which fades towards the past. */
-const PIECES = 5;
-/** Beyond it the scales are logarithmic [rad, rad/s]. */
-const SANE = 300;
+const PIECES = 5; // the number of pieces of the path, which fades towards the past
+const SANE = 300; // beyond it the scales are logarithmic [rad, rad/s]
 
 export class PhasePlot {
   constructor() {

@@ -2,7 +2,7 @@
 // Invariant: the live arm does not change, and outdated results are not reported.
 
 import { read, rungs } from "./ladder.js";
-import { fromRest, rolloutArgs } from "./question.js";
+import { fromRest, rolloutArgs, stabilityArgs } from "./question.js";
 import { rollout, stability } from "./runtime.js";
 
 /** @typedef {import("./question.js").Question} Question */
@@ -58,32 +58,48 @@ export class Series {
 }
 
 /**
- * Asks the study about `count` multiples of the gains, the lowest first, and reports each answer on arrival.
- * @param {import("./scale.js").LogScale} scale of the multiples
- * @param {number} count
- * @param {(factor: number) => Question} ask the question at a multiple
- * @param {() => boolean} isWanted whether to go on
- * @param {(factor: number, values: any) => void} tell
+ * The border of a map: the limits at multiples of the gains, the lowest first, as far as they are known. They belong to one question, and
+ * another question ends the old requests.
  */
-export async function climbRows(scale, count, ask, isWanted, tell) {
-  for (let row = 0; row < count && isWanted(); row += 1) {
-    const factor = scale.value(row / (count - 1));
-    const { result, values } = await stability(ask(factor));
-    if (result && isWanted()) tell(factor, values);
-  }
-}
+export class Border {
+  rows = /** @type {import("./chart.js").Row[]} */ ([]);
+  about = ""; // the question of the rows
+  at = /** @type {(factor: number) => Question} */ (() => { throw new Error("no question yet"); });
+  names = /** @type {Record<string, string>} */ ({});
 
-/**
- * The border of a map, to be copied. @param {string} name @param {import("./chart.js").Row[]} rows
- * @param {(factor: number) => import("./copy.js").Asked} ask the request of a row @returns {import("./copy.js").Content}
- */
-export function limitsContent(name, rows, ask) {
-  const limit = rows.some((row) => "continuous" in row) ? ["timestep, torque held", "timestep_limit_held"] : ["control period", "control_period_limit"];
-  return {
-    name, columns: ["multiple of the gains", `limit of the ${limit[0]} [s]`], rows: rows.map((row) => [row.factor, row.limit]),
-    asked: rows.map(({ factor }) => ask(factor)),
-    python: `zip([${rows.map(({ factor }) => factor).join(", ")}], [run.${limit[1]} for run in runs])`,
-  };
+  /** @param {import("./scale.js").LogScale} scale of the multiples @param {number} count of rows @param {() => void} tell called at each new row */
+  constructor(scale, count, tell) {
+    this.scale = scale;
+    this.count = count;
+    this.tell = tell;
+  }
+
+  /** Asks, unless it was asked already. @param {(factor: number) => Question} at @param {Record<string, string>} names of a row's limits in an answer */
+  async ask(at, names) {
+    const about = JSON.stringify([at(1), names]);
+    if (about === this.about) return;
+    Object.assign(this, { about, at, names, rows: [] });
+    for (let row = 0; row < this.count; row += 1) {
+      const factor = this.scale.value(row / (this.count - 1));
+      const { result, values } = await stability(at(factor));
+      if (this.about !== about) return;
+      if (!result) continue;
+      this.rows.push({ factor, limit: NaN, ...Object.fromEntries(Object.entries(names).map(([key, name]) => [key, values[name] ?? Infinity])) });
+      this.tell();
+    }
+    if (this.rows.length < this.count) this.about = ""; // asked again at the next message
+  }
+
+  /** The rows, to be copied. @param {string} name @returns {import("./copy.js").Content} */
+  content(name) {
+    const factors = this.rows.map(({ factor }) => factor);
+    const kind = this.names.continuous ? "timestep, torque held" : "control period";
+    return {
+      name, columns: ["multiple of the gains", `limit of the ${kind} [s]`], rows: this.rows.map((row) => [row.factor, row.limit]),
+      asked: factors.map((factor) => stabilityArgs(this.at(factor))),
+      python: `zip([${factors.join(", ")}], [run.${this.names.limit} for run in runs])`,
+    };
+  }
 }
 
 /**

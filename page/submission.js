@@ -3,15 +3,13 @@
 
 import { announce, byId, setText } from "./dom.js";
 import { isAlone, score } from "./kernel.js";
-import { drawMotions } from "./motions.js";
+import { playMotions } from "./motions.js";
 import { set } from "./store.js";
 import { Surface } from "./surface.js";
 import { openTab } from "./views.js";
 
-/** The most bytes of a submission, as in the program. */
-const MOST_BYTES = 2 ** 20;
-/** Simulation time of a step [ms]. */
-const STEP_MS = 50;
+const MOST_BYTES = 2 ** 20; // the most bytes of a submission, as in the program
+const STEP_MS = 50; // simulation time of a step [ms]
 
 let surface;
 let began = 0;
@@ -21,7 +19,7 @@ let motions = /** @type {import("./motions.js").Motion[]} */ ([]);
 export function startSubmission() {
   byId("submission").hidden = !isAlone;
   if (!isAlone) return;
-  surface = new Surface(byId("submission-motion"), paint);
+  surface = new Surface(byId("submission-motion"), (one) => playMotions(one, motions, began, STEP_MS * steps));
   byId("submission-file").addEventListener("change", ({ target }) => open(target.files[0]));
   document.addEventListener("dragover", (event) => event.preventDefault());
   document.addEventListener("drop", (event) => {
@@ -42,10 +40,4 @@ async function open(file) {
   [began, steps] = [performance.now(), poses.length - 1];
   motions = poses.length > 0 ? [{ name: file.name, note: `${(steps * STEP_MS) / 1000} s`, poses, lengths: [1, 1], color: "accent", target }] : [];
   surface.redraw();
-}
-
-function paint() {
-  const part = Math.min(1, (performance.now() - began) / (STEP_MS * steps));
-  drawMotions(surface, motions, part);
-  if (part < 1) requestAnimationFrame(() => surface.redraw());
 }

@@ -2,11 +2,11 @@
 // Invariant: a goal is shown as active only while the runtime reports it so. The clock and the count of a trial come from the
 // runtime, whichever client started it.
 
-import { announce, byId, el, setText } from "./dom.js";
+import { announce, byId, el, setText, warn } from "./dom.js";
 import { option, panel } from "./field.js";
 import { fixed } from "./format.js";
 import { DEFAULT_EPSILON, cancelGoal, disturb, sendGoal, trialSkip, trialStart, trialStop } from "./runtime.js";
-import { state, watch } from "./store.js";
+import { settingsKnown, state, watch, whenKnown } from "./store.js";
 
 export function startTasks() {
   startGoal();
@@ -30,7 +30,7 @@ function startGoal() {
   goalSaid = panel(byId("goal-body"), Object.values(fields), [
     // The runtime names the missing fields.
     ["Send target", () => goalSaid.report(sendGoal({ x: fields.x.number(), y: fields.y.number(), ...goalOptions() })), { type: "submit", class: "primary" }],
-    ["Cancel target", () => goalSaid.report(cancelGoal())],
+    ["Cancel target", cancelTarget],
   ], text);
   watch("links", (links) => { fields.phi.element.hidden = links < 3; });
   watch("goal", showGoal);
@@ -47,8 +47,14 @@ export function goalOptions() {
   };
 }
 
+export function cancelTarget() {
+  return goalSaid.report(cancelGoal());
+}
+
+/** A refusal of a place in the view, which is not a refusal of the fields. */
 export function showGoalRefusal(status) {
   setText(goalSaid.element, status);
+  if (status) warn(status);
 }
 
 export function showGoalPlace({ x, y }) {
@@ -132,7 +138,6 @@ function startPush() {
 
 /** Pushes the chosen joint, counter-clockwise for 1, clockwise for -1. */
 export function push(sign) {
-  if (state.links === 0) return;
-  const effort = new Array(state.links).fill(0).with(state.joint, sign * (pushEffort.number() ?? PUSH_EFFORT));
-  pushSaid.report(disturb(effort, pushSeconds.number() ?? PUSH_SECONDS));
+  const efforts = (links) => new Array(links).fill(0).with(state.joint, sign * (pushEffort.number() ?? PUSH_EFFORT));
+  pushSaid.report(whenKnown(settingsKnown, (links) => disturb(efforts(links), pushSeconds.number() ?? PUSH_SECONDS)));
 }

@@ -8,7 +8,7 @@ import { refusal } from "./field.js";
 import { duration, fixed } from "./format.js";
 import { limitInForce, SLOW, verdict } from "./policy.js";
 import { connectionText, MANY } from "./readouts.js";
-import { pause, setPeriod, step } from "./runtime.js";
+import { change, pause, step } from "./runtime.js";
 import { LOOP, state, watch } from "./store.js";
 
 let said;
@@ -19,12 +19,16 @@ export function startTransport() {
   byId("transport").after(said.element);
   byId("pause").addEventListener("click", togglePause);
   byId("step").addEventListener("click", singleStep);
-  byId("reset").addEventListener("click", () => said.report(resetArm()));
+  byId("reset").addEventListener("click", resetNow);
   watch("paused", (paused) => {
     setText(byId("pause-text"), paused ? "Run" : "Pause");
     announce(paused ? "Paused." : "Running.");
   });
   watch([...LOOP, "goal", "trial"], showNotice);
+}
+
+export function resetNow() {
+  return said.report(resetArm());
 }
 
 export function togglePause() {
@@ -71,7 +75,7 @@ function choose() {
     const key = connection === "silent" ? connection : links > 0 ? "lost" : "connecting";
     return { key, kind: links > 0 || failures >= MANY ? "bad" : "calm", text: connectionText(), buttons: [] };
   }
-  const smaller = slow ? [["Control at every step", () => said.report(setPeriod({ period: 0 }))]]
+  const smaller = slow ? [["Control at every step", () => said.report(change("period", { period: 0 }))]]
     : advised > 0 ? [[`Restart at ${duration(advised)}`, () => said.report(recover(advised))]] : [];
   // No timestep helps if the gains are the cause.
   const other = state.enabled && limitInForce(state).everyPose === 0 ? [["Suggest gains", takeSuggestion]] : [];

@@ -6,10 +6,10 @@
 import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
 import { chooseLinks, followLink, linksInLink, needed, stepInLink, ticksInLink } from "./course_view.js";
-import { announce, byId, el, goToAddress, passFocus, setAddress, setText } from "./dom.js";
+import { announce, byId, el, passFocus, setAddress, setText } from "./dom.js";
 import { isAlone, linksIn } from "./kernel.js";
 import { fromFragment, hasSettings, presentSettings, toFragment } from "./settings.js";
-import { set, state, watch } from "./store.js";
+import { known, set, settingsKnown, state, unknown, watch } from "./store.js";
 
 export function startViews() {
   byId("view-switch").addEventListener("click", () => show(state.view === "course" ? "workbench" : "course"));
@@ -36,7 +36,7 @@ export function startViews() {
     if (isAlone && links && links !== state.links && !hasSettings(fromFragment(location.hash))) return chooseLinks(links, location.hash);
     set("view", view);
     followLink();
-    if (state.params) offer();
+    if (settingsKnown()) offer();
   });
 }
 
@@ -58,7 +58,7 @@ function startLinks() {
 /** @param {"course" | "workbench"} view */
 function show(view) {
   const links = linksInLink();
-  if (view === "workbench" && stepIn(location.hash) >= 0) goToAddress(`#${links || "workbench"}`);
+  if (view === "workbench" && stepIn(location.hash) >= 0) setAddress(`#${links || "workbench"}`, "pushState");
   set("view", view);
 }
 
@@ -91,7 +91,7 @@ const SHOWN_MS = 2500;
 
 export function startShare() {
   byId("share").addEventListener("click", share);
-  if (location.hash.length > 1) watch("params", () => { if (!wasOffered) offer(); });
+  watch(["answered", "links"], () => { if (settingsKnown() && !wasOffered) offer(); });
 }
 
 /** The page's address with the present settings after the #. */
@@ -103,15 +103,10 @@ export function address() {
 }
 
 async function share() {
-  if (!presentSettings(state)) return;
-  const link = address();
-  setAddress(new URL(link).hash);
-  let said = "Link copied";
-  try {
-    await navigator.clipboard.writeText(link);
-  } catch {
-    said = window === parent ? "Link is in the address bar" : "Copying is not allowed here";
-  }
+  const link = await known(() => presentSettings(state)) && address();
+  if (link) setAddress(new URL(link).hash);
+  const refused = window === parent ? "Link is in the address bar" : "Copying is not allowed here";
+  const said = !link ? unknown().status : await navigator.clipboard?.writeText(link).then(() => "Link copied", () => null) ?? refused;
   setText(byId("share-text"), said);
   announce(said);
   setTimeout(() => setText(byId("share-text"), "Share"), SHOWN_MS);

@@ -35,7 +35,7 @@ pub const ASSETS: &[Asset] = assets! {
     "latest.js" "main.js" "mechanics.js" "motions.js" "packed.js" "plots.js" "policy.js" "question.js"
     "readouts.js" "realism.js" "responses.js" "rosbridge.js" "runtime.js" "scale.js" "scenes.js"
     "settings.js" "sheet.js" "stability_panel.js" "store.js" "strip_chart.js" "study.js"
-    "submission.js" "surface.js" "tasks_panel.js" "theme.js" "trail.js" "transport.js" "views.js"
+    "submission.js" "surface.js" "tasks_panel.js" "theme.js" "transport.js" "views.js"
 };
 
 /// The file at `path`, if it is part of the page.

@@ -24,6 +24,8 @@ FLAGS = [
     "--enable-precise-memory-info", "--js-flags=--expose-gc", "--remote-debugging-pipe",
 ]
 ANSWER_SECONDS = 60
+# Elements by a selector, as in a browser's console.
+CONSOLE = "globalThis.$ = (selector) => document.querySelector(selector), globalThis.$$ = (selector) => [...document.querySelectorAll(selector)];"
 # Width, height and RGBA of a PNG in base64, the latter in base64 too.
 DECODE = """(async () => {
   const bytes = Uint8Array.from(atob("%s"), (one) => one.charCodeAt(0));
@@ -154,6 +156,7 @@ class Page:
         browser._pages[self.session] = self
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.send(f"{domain}.enable")
+        self.before(CONSOLE)
         self.send("Emulation.setDeviceMetricsOverride", {"width": width, "height": height, "deviceScaleFactor": density, "mobile": touch})
         self.send("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]})
         if touch:
@@ -162,6 +165,10 @@ class Page:
 
     def send(self, method, params=None):
         return self.browser.send(method, params, self.session)
+
+    def before(self, script):
+        """Runs a script in every later document of the page, before its own."""
+        self.send("Page.addScriptToEvaluateOnNewDocument", {"source": script})
 
     def event(self, method, params):
         if method == "Runtime.exceptionThrown":
@@ -217,7 +224,20 @@ class Page:
             raise
 
     def text(self, selector):
-        return self.run(f"document.querySelector({json.dumps(selector)}).textContent")
+        return self.run(f"$({json.dumps(selector)}).textContent")
+
+    def choose(self, selector, value):
+        """Chooses an entry of a list."""
+        self.run(f"(() => {{ const one = $('{selector}'); one.value = '{value}'; one.dispatchEvent(new Event('change')); }})()")
+
+    def press(self, place, text):
+        """Presses the button with this text."""
+        self.run(f"$$('{place} button').find((one) => one.textContent === {json.dumps(text)}).click()")
+
+    def reloads(self, act, shown="true"):
+        """Waits until the page is loaded anew because of an action, and something is true in it."""
+        self.run(f"window.old = 1, {act}")
+        self.until(f"window.old === undefined && {shown}", why=f"the page anew, {shown}")
 
     def click(self, selector):
         """A click by the mouse, at the middle of the element, wherever it had to be scrolled to."""
@@ -229,7 +249,7 @@ class Page:
         """Left, top, width and height of the element in the window [CSS pixels], in its middle and once it has come to rest."""
         before = None
         for _ in range(50):
-            box = self.run(f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.scrollIntoView({{block: 'center'}});"
+            box = self.run(f"(() => {{ const e = $({json.dumps(selector)}); e.scrollIntoView({{block: 'center'}});"
                            " const b = e.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
             if box == before:
                 return box
@@ -270,7 +290,7 @@ class Page:
 
     def fill(self, selector, text):
         """Types into a field in place of what it holds, and presses Enter."""
-        self.run(f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.scrollIntoView({{block: 'center'}}); e.focus(); e.select(); }})()")
+        self.run(f"(() => {{ const e = $({json.dumps(selector)}); e.scrollIntoView({{block: 'center'}}); e.focus(); e.select(); }})()")
         self.insert(text)
         self.key("Enter")
 

@@ -62,9 +62,13 @@ class PageTest(unittest.TestCase):
     course = False  # whether the test is of the course; else the workbench is opened
 
     def setUp(self):
+        self.begin()
+        self.page = self.open(**self.view)
+
+    def begin(self):
+        """A new arm."""
         self.runtime = Alone(self.links) if IS_FILE else Runtime(links=self.links)
         self.addCleanup(self.runtime.__exit__)
-        self.page = self.open(**self.view)
 
     def visit(self, url, **view):
         """A page at any address."""
@@ -90,12 +94,15 @@ class PageTest(unittest.TestCase):
 
     def connected(self, page=None, links=None):
         page = page or self.page
-        page.until("document.querySelector('#connection')?.className === 'pill open'", why="connected")
-        page.until(f"document.querySelectorAll('#kp-fields input[type=number]').length === {links or self.links}")
-        page.until("document.querySelector('#kp-fields input[type=number]').value !== ''", why="gains shown")
+        page.until("$('#connection')?.className === 'pill open'", why="connected")
+        page.until(f"$$('#kp-fields input[type=number]').length === {links or self.links}")
+        self.own(page)
+        page.until("own('store.js').then(({ state }) => state.answered)", why="all settings are known")
         if not self.course:
-            page.run("document.body.dataset.view === 'course' && document.querySelector('#view-switch').click()")
-        # The page's own modules, those that run, by name.
+            page.run("document.body.dataset.view === 'course' && $('#view-switch').click()")
+
+    def own(self, page):
+        """`own(name)` on the page gives its own module, the one that runs."""
         page.run(f"void (window.own = {'async (name) => pendularm[name]' if IS_FILE else '(name) => import(`/${name}`)'})")
 
     def values(self, service, **args):
@@ -112,7 +119,7 @@ class PageTest(unittest.TestCase):
     def tab(self, name):
         """Opens a panel beside the arm."""
         self.page.click(f"#tab-{name}")
-        self.page.until(f"!document.querySelector('#{name}').hidden")
+        self.page.until(f"!$('#{name}').hidden")
 
     def keep(self, name, **how):
         """A screenshot on the way; each test keeps one of its end."""
@@ -121,17 +128,17 @@ class PageTest(unittest.TestCase):
     def image(self, selector):
         """A picture of a canvas after the next frame, because the page says something before it draws it."""
         return self.page.decode(base64.b64decode(self.page.run(f"""new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))
-            .then(() => document.querySelector('{selector}').toDataURL().split(',')[1])""")))
+            .then(() => $('{selector}').toDataURL().split(',')[1])""")))
 
     def color(self, name):
         """A colour of the style sheet, in the theme that is on."""
-        text = self.page.run(f"(() => {{ const e = document.querySelector('#probe'); e.style.color = 'var(--{name})'; return getComputedStyle(e).color; }})()")
+        text = self.page.run(f"(() => {{ const e = $('#probe'); e.style.color = 'var(--{name})'; return getComputedStyle(e).color; }})()")
         return tuple(int(one) for one in re.findall(r"\d+", text)[:3])
 
     def pause(self):
         """The arm is paused, and the page says so."""
         self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.page.until("$('#run-state').textContent === 'paused'")
 
     def settle(self, positions):
         """The controller holds the arm at `positions`, and then it is paused: a picture that does not change."""
@@ -144,7 +151,7 @@ class PageTest(unittest.TestCase):
         """The controller shakes the arm: its timestep is a quarter beyond the limit."""
         self.runtime.call("/arm_sim/set_integrator", timestep=0.0055)
         self.runtime.call("/pid_controller/enable", data=True)
-        self.page.until("document.querySelector('#verdict-pill').textContent === 'beyond the limit'")
+        self.page.until("$('#verdict-pill').textContent === 'beyond the limit'")
 
     def wait(self, done, why, seconds=60):
         """Waits for something of the runtime."""

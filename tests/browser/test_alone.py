@@ -15,7 +15,7 @@ SUBMISSIONS = pathlib.Path(__file__).parents[1] / "data/submissions.jsonl"
 REPORT = """<script>setInterval(() => parent.postMessage([document.querySelector("#connection").className,
   Number(document.querySelector("#sim-time").textContent), document.querySelector("#share-text").textContent,
   document.querySelector("#announce-polite").textContent], "*"), 100);</script>"""
-SHOWN = "document.querySelector('#connection')?.className === 'pill open' && Number(document.querySelector('#sim-time').textContent) > 0.2"
+SHOWN = "$('#connection')?.className === 'pill open' && Number($('#sim-time').textContent) > 0.2"
 
 
 @unittest.skipUnless(IS_FILE, "the page of a server has no kernel")
@@ -30,7 +30,7 @@ class AloneTest(PageTest):
         page.until("window.received && window.received[0] === 'pill open' && window.received[1] > 0.3", why="the arm runs in the frame")
         for button, part, said in (("share", 2, "Copying is not allowed here"), ("full-screen", 3, "Full screen is not allowed here.")):
             # The step announces itself too, maybe later.
-            page.until(f"document.querySelector('iframe').contentWindow.postMessage('{button}', '*'), window.received[{part}] === '{said}'")
+            page.until(f"$('iframe').contentWindow.postMessage('{button}', '*'), window.received[{part}] === '{said}'")
         self.assertEqual(page.complaints, [])
 
     def test_in_a_frame_of_text_a_first_script_gives_it_a_step_and_settings(self):
@@ -38,7 +38,7 @@ class AloneTest(PageTest):
         text = FILE.read_text().replace("<script", "<script>location.hash = '#step=2&links=3&timestep=0.002';</script><script", 1)
         page.run("""((text) => { const frame = document.createElement("iframe"); frame.width = 1200; frame.height = 800;
           frame.srcdoc = text; document.body.append(frame); })(%s)""" % json.dumps(text))
-        inside = "document.querySelector('iframe').contentDocument"
+        inside = "$('iframe').contentDocument"
         page.until(f"{inside}.querySelector('#offer')?.textContent.includes('timestep 0.002')", why="the settings are offered")
         page.until(f"{inside}.querySelector('#course-number').textContent.startsWith('Step 2')")
         page.until(f"{inside}.querySelector('#links').value === '3'")
@@ -47,7 +47,7 @@ class AloneTest(PageTest):
     @needs_chromium("a script before those of the page")
     def test_without_a_worker_the_page_itself_runs_the_arm(self):
         page = self.visit("about:blank")
-        page.send("Page.addScriptToEvaluateOnNewDocument", {"source": "window.Worker = class { constructor() { throw new Error('forbidden'); } };"})
+        page.before("window.Worker = class { constructor() { throw new Error('forbidden'); } };")
         page.go(self.runtime.url)
         page.until(SHOWN, why="the arm runs")
         self.runtime.page = page
@@ -55,7 +55,7 @@ class AloneTest(PageTest):
         self.assertEqual(page.complaints, [])
 
     def test_the_kernel_has_the_bits_of_the_native_program(self):
-        ours = self.page.run("""pendularm["packed.js"].unpack(document.querySelector("#kernel-module").textContent)
+        ours = self.page.run("""pendularm["packed.js"].unpack($("#kernel-module").textContent)
             .then((bytes) => WebAssembly.instantiate(bytes, { env: { milliseconds: () => performance.now() } }))
             .then(({ instance: { exports } }) => { const length = exports.compare(); return new TextDecoder().decode(new Uint8Array(exports.memory.buffer,
                 exports.output(), length)); })""")
@@ -68,13 +68,13 @@ class AloneTest(PageTest):
         wrong = text.replace('"trail": ["', '"trail": ["0', 1)
         for given, how, said in ((text, "drop", ": confirmed"), (wrong, "open", ": refused, departs at step 0"), (text, "open", ": confirmed")):
             self.page.run("""((text, how) => {
-                const data = new DataTransfer(), input = document.querySelector('#submission-file');
+                const data = new DataTransfer(), input = $('#submission-file');
                 data.items.add(new File([text], 'mine.json'));
                 if (how === 'open') { input.files = data.files; input.dispatchEvent(new Event('change')); }
                 else document.dispatchEvent(new DragEvent('drop', { dataTransfer: data, cancelable: true }));
             })(%s, %s)""" % (json.dumps(given), json.dumps(how)))
-            self.page.until(f"document.querySelector('#submission-text').textContent.endsWith({json.dumps(said)})")
-            self.assertEqual(self.page.run("document.querySelector('#submission-motion').checkVisibility()"), given == text)
+            self.page.until(f"$('#submission-text').textContent.endsWith({json.dumps(said)})")
+            self.assertEqual(self.page.run("$('#submission-motion').checkVisibility()"), given == text)
         self.assertEqual(json.loads(text)["task"], "PendularmReach-v0")
         for color in ("accent", "target"):
             self.wait(lambda: self.image("#submission-motion").count(self.color(color)) > 20, f"the {color}")
@@ -93,9 +93,8 @@ class AloneTest(PageTest):
         page.until(SHOWN, why="the arm runs")
         self.runtime.page = page
         self.assertEqual(len(self.runtime.next("/joint_states")["position"]), 3)
-        page.until("document.querySelector('#links').checkVisibility() && document.querySelector('#links').value === '3'")
-        page.run("window.old = 1, document.querySelector('#links').value = '2', document.querySelector('#links').dispatchEvent(new Event('change'))")
-        page.until(f"window.old === undefined && {SHOWN} && document.querySelector('#links').value === '2'", why="the page anew")
+        page.until("$('#links').checkVisibility() && $('#links').value === '3'")
+        page.reloads("$('#links').value = '2', $('#links').dispatchEvent(new Event('change'))", f"{SHOWN} && $('#links').value === '2'")
         self.assertEqual(len(self.runtime.next("/joint_states")["position"]), 2)
         self.assertEqual(page.run("location.hash"), "#step=slow&links=2")
         self.assertEqual(page.complaints, [])
@@ -103,10 +102,9 @@ class AloneTest(PageTest):
     def test_the_address_keeps_the_number_of_links_and_another_one_brings_that_arm(self):
         page = self.page
         for address, after in (("#links=3", "#links=3"), ("#step=4&links=2", "#step=4&links=2")):
-            page.run(f"window.old = 1, location.hash = '{address}'")
-            page.until(f"window.old === undefined && {SHOWN} && document.querySelector('#links').value === '{after[-1]}'", why="the page anew")
+            page.reloads(f"location.hash = '{address}'", f"{SHOWN} && $('#links').value === '{after[-1]}'")
             self.assertEqual(page.run("location.hash"), after)
-        page.until("document.querySelector('#course-start').textContent === 'Restart step'", why="a step that starts at once")
+        page.until("$('#course-start').textContent === 'Restart step'", why="a step that starts at once")
         page.click("#course-next")
         self.assertEqual(page.run("location.hash"), "#step=timestep&links=2")
         page.click("#view-switch")

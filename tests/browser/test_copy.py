@@ -14,9 +14,8 @@ KEEP_SECONDS = 15  # then a chart is complete
 class Copy:
     def copied(self, form, caption):
         """The text that the button of a chart gives as a table or as Python; empty while there is none."""
-        self.page.run(f"document.querySelector('{caption} .copy').click(), document.querySelector('#copy-{form}').click(), "
-            "document.querySelector('#copy .close').click()")
-        return self.page.run("document.querySelector('#copy-area').value")
+        self.page.run(f"$('{caption} .copy').click(), $('#copy-{form}').click(), $('#copy .close').click()")
+        return self.page.run("$('#copy-area').value")
 
     def store(self, name, caption="#course figcaption", seconds=KEEP_SECONDS):
         if os.environ.get("KEEP"):
@@ -49,6 +48,8 @@ class OfTheCourse(Copy, CourseTest):
         self.step("price")
         self.page.click("#course-measure")
         self.keeps("ladder")
+        self.done("measured")
+        self.assertGreater(self.image("#course-chart").count(self.color("method1")), 40)
         self.step("pid")
         self.page.click("#course-extra [data-motors*=none]")
         self.keeps("responses")
@@ -56,9 +57,8 @@ class OfTheCourse(Copy, CourseTest):
 
 class OfTheWorkbench(Copy, PageTest):
     def test_a_comparison_a_push_and_a_map(self):
-        self.page.until("own('store.js').then(({ state }) => state.setpointKnown && state.period !== null)")
         self.tab("compare")
-        self.page.run("document.querySelectorAll('#compare-form select').forEach((one, i) => { one.value = ['rest', 'on'][i]; })")
+        self.page.run("$$('#compare-form select').forEach((one, i) => { one.value = ['rest', 'on'][i]; })")
         self.page.fill("#compare-form .option:nth-of-type(2) input", "0.5")
         self.keeps("comparison", "#compare")
         self.page.click("#controller")
@@ -68,6 +68,6 @@ class OfTheWorkbench(Copy, PageTest):
 
     def test_there_is_nothing_to_copy_of_a_measurement_that_was_not_made(self):
         self.tab("error")
-        self.page.run("document.querySelector('#error .copy').click()")
+        self.page.run("$('#error .copy').click()")
         self.assertEqual(self.page.text("#copy-text"), "This chart has no numbers yet.")
-        self.assertTrue(self.page.run("document.querySelector('#copy-table').disabled && document.querySelector('#copy-python').disabled"))
+        self.assertTrue(self.page.run("$('#copy-table').disabled && $('#copy-python').disabled"))

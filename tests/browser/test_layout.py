@@ -8,12 +8,12 @@ from stage import PageTest, needs_chromium
 AXE = pathlib.Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 PANELS = ("plots", "stability", "error", "compare", "tasks")
 # Parts in sight whose content is wider than they are, and captions and figures that are not whole.
-CLIPPED = """[...document.querySelectorAll('figcaption, figure, main, section, details, .segment, input[type=number]')].filter((one) => one.checkVisibility()
+CLIPPED = """$$('figcaption, figure, main, section, details, .segment, input[type=number]').filter((one) => one.checkVisibility()
     && (one.scrollWidth > one.clientWidth || (one.matches('figcaption, figure') && one.scrollHeight > one.clientHeight)))
     .map((one) => one.id || one.textContent)"""
 # Pairs of readouts whose texts overlap.
 OVERLAPS = """(() => {
-  const boxes = [...document.querySelectorAll('.readouts > div')].map((one) => {
+  const boxes = $$('.readouts > div').map((one) => {
     const range = document.createRange();
     range.selectNodeContents(one);
     return [one.textContent, range.getBoundingClientRect()];
@@ -43,7 +43,7 @@ class Access:
         for panel in PANELS:
             self.tab(panel)
             if panel == "stability":
-                self.page.run("document.querySelector('.robot').open = true")
+                self.page.run("$('.robot').open = true")
             self.assertEqual(audit(self.page), [], panel)
         self.keep(f"layout-{type(self).__name__}", whole=True)
         forget_the_inspectors(self.page)
@@ -54,8 +54,8 @@ class Free:
 
     def test_nothing_lies_over_the_arm(self):
         self.shake()
-        over = self.page.run("""(() => { const arm = document.querySelector('#arm').getBoundingClientRect();
-            return [...document.querySelectorAll('.clock, .view-tools, #notice')].filter((one) => {
+        over = self.page.run("""(() => { const arm = $('#arm').getBoundingClientRect();
+            return $$('.clock, .view-tools, #notice').filter((one) => {
                 const b = one.getBoundingClientRect();
                 return b.bottom > arm.top + 1 && b.top < arm.bottom - 1;
             }).map((one) => one.id || one.className); })()""")
@@ -66,22 +66,22 @@ class Steady:
     """A button does not go from under the pointer because a figure has come."""
 
     def test_controls_stay_where_they_are_when_the_limit_comes(self):
-        top = "document.querySelector('#reset').getBoundingClientRect().top + scrollY"
-        self.page.until("document.querySelector('#out-every').textContent === '–'", why="no loop, no limit")
+        top = "$('#reset').getBoundingClientRect().top + scrollY"
+        self.page.until("$('#out-every').textContent === '–'", why="no loop, no limit")
         before = self.page.run(top)
         self.runtime.call("/pid_controller/enable", data=True)
-        self.page.until("document.querySelector('#out-certified').textContent === 'estimate'")
+        self.page.until("$('#out-certified').textContent === 'estimate'")
         self.assertEqual(self.page.run(top), before, "estimate")
         self.assertEqual(self.page.run(OVERLAPS), [])
         self.runtime.call("/pid_controller/set_gains", kp=[60, 30], ki=[300, 0], kd=[25, 8])
-        self.page.until("document.querySelector('#out-certified').textContent === 'found'")
+        self.page.until("$('#out-certified').textContent === 'found'")
         self.assertEqual(self.page.run(top), before, "found")
         self.assertEqual(self.page.run(OVERLAPS), [])
 
 
 class Desktop(Access, Steady, PageTest):
     def box(self, selector):
-        return self.page.run(f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect();"
+        return self.page.run(f"(() => {{ const b = $('{selector}').getBoundingClientRect();"
                              " return [b.left, b.top, b.right, b.bottom]; })()")
 
     def test_the_first_screen_holds_the_arm_its_settings_and_a_panel(self):
@@ -93,7 +93,7 @@ class Desktop(Access, Steady, PageTest):
 
     def test_no_moving_canvas_is_in_a_round_clip(self):
         """Canvases, which a browser draws apart, and once more through a mask, in every frame."""
-        clips = self.page.run("""[...document.querySelectorAll('#arm, #plots canvas')].flatMap((one) => {
+        clips = self.page.run("""$$('#arm, #plots canvas').flatMap((one) => {
             const found = [];
             for (let e = one.parentElement; e; e = e.parentElement) {
                 const { overflow, borderRadius } = getComputedStyle(e);
@@ -111,12 +111,12 @@ class ThreeLinks(Access, PageTest):
     links = 3
 
     def test_every_joints_field_is_in_one_line_with_its_slider_or_below_it(self):
-        tops = self.page.run("[...document.querySelectorAll('#kp-fields .field')].map((one) => Math.round(one.getBoundingClientRect().top))")
+        tops = self.page.run("$$('#kp-fields .field').map((one) => Math.round(one.getBoundingClientRect().top))")
         self.assertEqual(len(set(tops)), 1, "side by side")
-        self.assertLessEqual(self.page.run("document.querySelector('#lengths-fields').getBoundingClientRect().bottom"), 900, "without scrolling")
-        self.assertEqual(self.page.run("(() => { const e = document.querySelector('#controls'); return e.scrollHeight - e.clientHeight; })()"), 0)
+        self.assertLessEqual(self.page.run("$('#lengths-fields').getBoundingClientRect().bottom"), 900, "without scrolling")
+        self.assertEqual(self.page.run("(() => { const e = $('#controls'); return e.scrollHeight - e.clientHeight; })()"), 0)
         # A legend without its first values is a little higher.
-        self.page.until("document.querySelector('#legend-drift').textContent.length > 3")
+        self.page.until("$('#legend-drift').textContent.length > 3")
         self.assertEqual(self.page.run(CLIPPED), [])
 
 
@@ -124,10 +124,10 @@ class Laptop(Free, Steady, PageTest):
     view = {"width": 1280, "height": 720}
 
     def test_captions_are_whole_also_while_an_arm_shakes(self):
-        self.page.until("document.querySelector('#legend-drift').textContent.length > 3 && document.querySelector('#legend-drift + .unit').checkVisibility()")
+        self.page.until("$('#legend-drift').textContent.length > 3 && $('#legend-drift + .unit').checkVisibility()")
         self.assertEqual(self.page.run(CLIPPED), [])
         self.shake()
-        self.page.until("document.querySelector('#legend-drift-name').textContent === 'work'")
+        self.page.until("$('#legend-drift-name').textContent === 'work'")
         for _ in range(40):
             self.assertEqual(self.page.run(CLIPPED), [])
             time.sleep(0.1)
@@ -141,10 +141,10 @@ class Narrow(PageTest):
         for width, height, size in ((320, 700, 100), (1280, 720, 100), (1280, 720, 200), (1024, 768, 200), (390, 844, 200)):
             self.page.send("Emulation.setDeviceMetricsOverride", {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500})
             self.page.run(f"document.documentElement.style.fontSize = '{size}%'")
-            self.assertEqual(self.page.run("getComputedStyle(document.querySelector('#kp-fields label')).fontSize"), f"{12 * size // 100}px")
+            self.assertEqual(self.page.run("getComputedStyle($('#kp-fields label')).fontSize"), f"{12 * size // 100}px")
             for panel, figure in (("plots", "legend-drift"), ("stability", "map-value")):
                 self.tab(panel)
-                self.page.until(f"document.querySelector('#{figure}').textContent.length > 3")
+                self.page.until(f"$('#{figure}').textContent.length > 3")
                 self.assertEqual(self.page.run(CLIPPED), [], f"{width} px, text at {size} %")
 
 
@@ -153,18 +153,18 @@ class Phone(Free, Steady, Access, PageTest):
 
     def test_arm_integrator_and_controller_come_first(self):
         tops, width = self.page.run("[['#arm', '#transport', '#methods', '#kp-fields', '#panel'].map((one) => "
-            "document.querySelector(one).getBoundingClientRect().top), document.documentElement.scrollWidth]")
+            "$(one).getBoundingClientRect().top), document.documentElement.scrollWidth]")
         self.assertEqual((tops, width), (sorted(tops), 390))
 
     def test_settings_that_fold_show_that_they_do(self):
-        marks = lambda: self.page.run("[...document.querySelectorAll('#controls summary')].map((one) => getComputedStyle(one, '::before').content[1])")
+        marks = lambda: self.page.run("$$('#controls summary').map((one) => getComputedStyle(one, '::before').content[1])")
         self.assertEqual(marks(), ["▾", "▾", "▸", "▸"])
         self.page.click("#controls details:last-child summary")
         self.assertEqual(marks(), ["▾", "▾", "▸", "▾"])
 
     def test_touch_targets_are_44_pixels_high(self):
-        self.page.run("document.querySelector('#tab-stability').click(), document.querySelector('.robot').open = true")
-        small = self.page.run("[...document.querySelectorAll('button, select, textarea, input:not([type=checkbox], [type=radio]), summary, .segment')]"
+        self.page.run("$('#tab-stability').click(), $('.robot').open = true")
+        small = self.page.run("$$('button, select, textarea, input:not([type=checkbox], [type=radio]), summary, .segment')"
                               ".filter((one) => one.checkVisibility()).map((one) => [one.id || one.outerHTML.slice(0, 80), one.getBoundingClientRect().height])"
                               ".filter(([, height]) => height < 44)")
         self.assertEqual(small, [])

@@ -28,7 +28,7 @@ class View:
     def test_every_plot_shows_every_joint(self):
         # A free swing moves all joints, so no line covers another. Drawing begins when the page has connected, which
         # may be late: so two seconds from then on.
-        shown = "Number(document.querySelector('#sim-time').textContent)"
+        shown = "Number($('#sim-time').textContent)"
         self.page.until(f"{shown} > 0")
         self.page.until(f"{shown} > {self.page.run(shown) + 2}")
         self.runtime.call("/arm_sim/pause", data=True)
@@ -44,7 +44,7 @@ class View:
 
     def test_canvases_have_a_pixel_for_each_of_the_screen_and_are_opaque(self):
         """So that a frame is copied to the screen as it is, neither resampled nor blended: edges are where a browser rounds them to."""
-        look = """[...document.querySelectorAll('canvas')].filter((one) => one.clientWidth > 0).map((one) => {
+        look = """$$('canvas').filter((one) => one.clientWidth > 0).map((one) => {
             const { left, top, right, bottom } = one.getBoundingClientRect();
             const pixels = (from, to) => Math.round(to * devicePixelRatio) - Math.round(from * devicePixelRatio);
             return [one.id, one.width - pixels(left, right), one.height - pixels(top, bottom), one.getContext('2d').getContextAttributes().alpha];
@@ -79,18 +79,18 @@ class TwoLinks(View, Sums, PageTest):
     def test_a_goal_shows_its_target_and_says_when_it_is_reached(self):
         self.assertLess(self.image("#arm").count(self.color("target")), 5)
         self.runtime.call("/ik_action/send_goal", x=0.4, y=1.1)
-        self.page.until("document.querySelector('#goal-text').textContent.startsWith('On the way')")
+        self.page.until("$('#goal-text').textContent.startsWith('On the way')")
         self.assertGreater(self.image("#arm").count(self.color("target")), 20)
         self.assertIn("controller is off", self.page.text("#notice"))
         self.page.click("#notice button")
-        self.page.until("document.querySelector('#goal-text').textContent.startsWith('Reached')")
-        self.page.until("document.querySelector('#announce-polite').textContent === 'Target reached.'")
+        self.page.until("$('#goal-text').textContent.startsWith('Reached')")
+        self.page.until("$('#announce-polite').textContent === 'Target reached.'")
         self.assertTrue(self.runtime.call("/pid_controller/enable")["values"]["data"])
 
     def test_the_real_time_factor_is_shown_and_the_arm_is_described_in_a_sentence(self):
-        self.page.until("Math.abs(parseFloat(document.querySelector('#out-rtf').textContent) - 1) < 0.1")
+        self.page.until("Math.abs(parseFloat($('#out-rtf').textContent) - 1) < 0.1")
         self.settle([0.5, 0.5])
-        self.page.until("document.querySelector('#arm-text').textContent.includes('paused, controller on. Joints at 29, 29 degrees')")
+        self.page.until("$('#arm-text').textContent.includes('paused, controller on. Joints at 29, 29 degrees')")
 
     def test_a_file_is_handed_over(self):
         self.page.until("own('history.js').then(({ record }) => record.length > 30)")

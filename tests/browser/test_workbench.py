@@ -25,18 +25,18 @@ class Ways(PageTest):
     def test_a_refusal_and_a_pause_cannot_be_undone(self):
         self.page.until("own('store.js').then(({ state }) => state.setpointKnown)")
         self.page.click("#pause")
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.page.until("$('#run-state').textContent === 'paused'")
         self.page.click("#pause")
-        self.page.until("document.querySelector('#run-state').textContent === 'running'")
+        self.page.until("$('#run-state').textContent === 'running'")
         self.page.fill(f"#timestep-field {NUMBER}", "-1")
-        self.page.until("document.querySelector('#timestep-field .refusal').textContent === 'timestep must be greater than 0'")
-        self.assertTrue(self.page.run("document.querySelector('#undo').disabled"))
+        self.page.until("$('#timestep-field .refusal').textContent === 'timestep must be greater than 0'")
+        self.assertTrue(self.page.run("$('#undo').disabled"))
         self.page.fill(f"#timestep-field {NUMBER}", "2")
-        self.page.until("!document.querySelector('#undo').disabled")
-        self.page.run("document.querySelector('#undo').focus()")
+        self.page.until("!$('#undo').disabled")
+        self.page.run("$('#undo').focus()")
         self.page.key("Enter")
         self.wait(lambda: self.values("/arm_sim/set_integrator")["timestep"] == 0.001, "undone")
-        self.page.until("document.querySelector('#undo').disabled && document.activeElement.id === 'arm'", why="the focus is not lost")
+        self.page.until("$('#undo').disabled && document.activeElement.id === 'arm'", why="the focus is not lost")
 
     def test_one_cursor_is_on_all_plots(self):
         self.page.until("own('history.js').then(({ record }) => record.length > 120)")
@@ -45,17 +45,17 @@ class Ways(PageTest):
         now = self.page.text("#legend-velocity")
         x, y = self.page.place("#plot-position")
         self.page.mouse("mouseMoved", x + 150, y)
-        self.page.until(f"document.querySelector('#legend-velocity').textContent !== {json.dumps(now)}")
+        self.page.until(f"$('#legend-velocity').textContent !== {json.dumps(now)}")
         self.page.mouse("mouseMoved", 5, 5)
-        self.page.until(f"document.querySelector('#legend-velocity').textContent === {json.dumps(now)}")
+        self.page.until(f"$('#legend-velocity').textContent === {json.dumps(now)}")
 
     def test_plots_can_be_zoomed_and_their_scales_fixed(self):
         self.page.key("+")
-        self.page.until("document.querySelector('#plot-span').value === '5'")
+        self.page.until("$('#plot-span').value === '5'")
         self.page.key("-")
-        self.page.until("document.querySelector('#plot-span').value === '10'")
+        self.page.until("$('#plot-span').value === '10'")
         self.page.click("#plot-fix")
-        self.page.until("document.querySelector('#plot-fix').getAttribute('aria-pressed') === 'true'")
+        self.page.until("$('#plot-fix').getAttribute('aria-pressed') === 'true'")
 
 
 class Defaults(PageTest):
@@ -81,10 +81,11 @@ class Suggestion(PageTest):
         # it.
         self.runtime.call("/pid_controller/set_gains", kp=[1, 1], ki=[3000, 3000], kd=[0, 0])
         self.runtime.call("/pid_controller/enable", data=True)
-        self.page.until("[...document.querySelectorAll('#notice button')].some((one) => one.textContent === 'Suggest gains')")
+        self.page.until("$$('#notice button').some((one) => one.textContent === 'Suggest gains')")
         weak = self.values("/pid_controller/set_gains")
-        self.page.run("[...document.querySelectorAll('#notice button')].find((one) => one.textContent === 'Suggest gains').click()")
+        self.page.press("#notice", "Suggest gains")
         self.wait(lambda: self.values("/pid_controller/set_gains") not in (before, weak), "suggested gains")
+        self.page.until("!$('#undo').disabled")
         self.page.click("#undo")
         self.wait(lambda: self.values("/pid_controller/set_gains") == weak, "undone")
 

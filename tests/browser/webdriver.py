@@ -17,13 +17,13 @@ import time
 import urllib.error
 import urllib.request
 
-from chromium import ANSWER_SECONDS, BrowserError
+from chromium import ANSWER_SECONDS, CONSOLE, BrowserError
 from chromium import Page as ChromiumPage
 
 KEYS = {"Enter": "\ue007", "Tab": "\ue004", "Escape": "\ue00c", "Delete": "\ue017", "Shift": "\ue008", "ArrowUp": "\ue013", "ArrowDown": "\ue015",
         "ArrowLeft": "\ue012", "ArrowRight": "\ue014"}
 # The value of an expression, or the text of its error.
-RUN = "const done = arguments[0]; (async () => (%s\n))().then((value) => done([value]), (error) => done([null, `${error}`]));"
+RUN = CONSOLE + "const done = arguments[0]; (async () => (%s\n))().then((value) => done([value]), (error) => done([null, `${error}`]));"
 # Errors in the console of Firefox, asked in its own window around the page.
 SAID = """return Services.console.getMessageArray().filter((one) => one instanceof Ci.nsIScriptError && !(one.flags & one.warningFlag)
   && /^(file|blob|https?):/.test(one.sourceName)).map(String)"""
