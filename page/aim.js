@@ -109,7 +109,6 @@ function shape() {
   return state.links > 0 && state.params?.lengths.length === state.links ? state.params.lengths : null;
 }
 
-/** Whether a touch is on the end effector. */
 function isOnEnd({ clientX, clientY }) {
   if (!shape()) return false;
   const { x, y } = toWorld({ clientX, clientY });

@@ -177,7 +177,6 @@ function drawTarget(n) {
   context.globalAlpha = 1;
 }
 
-/** A thin line for the remaining distance. */
 function drawWay(n, target, color) {
   joints(n, state.position, lengths(), x, y);
   context.globalAlpha = 0.6;
@@ -348,7 +347,6 @@ function drawTrail(paint, since, time, pieces) {
   paint.globalAlpha = 1;
 }
 
-/** From row `i` to the next. */
 function extend(paint, i) {
   const { data } = record;
   const n = state.links;

@@ -90,12 +90,10 @@ export class Chart {
     this.bottom = height - bottom;
   }
 
-  /** @param {number} value */
   x(value) {
     return this.left + this.across.place(value) * (this.right - this.left);
   }
 
-  /** @param {number} value */
   y(value) {
     return this.bottom - this.up.place(value) * (this.bottom - this.top);
   }

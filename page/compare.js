@@ -200,7 +200,6 @@ function drawArms({ context, width, height }) {
   context.globalAlpha = 1;
 }
 
-/** From the smallest error above rounding to the largest. */
 function errorScale() {
   const values = runs.flatMap(({ away }) => away ?? []).filter((one) => one !== null && one > SMALLEST);
   return LogScale.around(values.length > 0 ? values : [SMALLEST], 6, powerOfTen);

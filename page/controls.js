@@ -63,7 +63,6 @@ export async function chooseMethod(method) {
   return answer;
 }
 
-/** The timestep and the control period, each with its limit. */
 function startClocks() {
   const timestep = numberField({ label: "timestep", ...CLOCK, commit: (ms) => change("integrator", { timestep: seconds(ms) }) });
   const period = numberField({ label: "control period", ...CLOCK, zero: true, zeroText: "every step",

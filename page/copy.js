@@ -69,7 +69,6 @@ export function copyable(caption, content) {
   }, "Copy"));
 }
 
-/** @param {Content | null} content */
 function open(content) {
   shown = content && content.rows.length > 0 ? content : null;
   byId("copy-area").value = "";

@@ -17,6 +17,7 @@ import { drawLadder, keyOf, presentMove } from "./ladder_panel.js";
 import { isAlone, linksIn } from "./kernel.js";
 import { latestOnly } from "./latest.js";
 import { FAILING, motionOf, motionsOf, playMotions } from "./motions.js";
+import { StripChart } from "./plots.js";
 import { controlPeriodLimit, verdict } from "./policy.js";
 import { fromRest, heldTime, questionOf, rolloutArgs, stepsPerUpdate } from "./question.js";
 import { connectionText } from "./readouts.js";
@@ -27,7 +28,6 @@ import { SCENES, settingsOf } from "./scenes.js";
 import { DEFAULTS, fromFragment, hasSettings, presentSettings, toFragment } from "./settings.js";
 import { showForm } from "./sheet.js";
 import { known, settingsKnown, state, unknown, watch, watchAll } from "./store.js";
-import { StripChart } from "./strip_chart.js";
 import { Border, deviation, Series } from "./study.js";
 import { Surface } from "./surface.js";
 
@@ -109,7 +109,6 @@ function anew() {
 const ticks = new Set();
 const TICKS = "pendularm-done";
 
-/** @param {...string} ids */
 function tick(...ids) {
   for (const id of ids) ticks.add(id);
   keepChoice(TICKS, [...ticks].join(","));
@@ -237,7 +236,6 @@ async function again() {
   return answer;
 }
 
-/** Shows a refusal in the step's line. */
 async function report(call) {
   const { result, status } = await call;
   if (!result) setText(byId("course-status"), inPageNames(status));
@@ -358,7 +356,6 @@ function gainFields() {
 /** Pictures of the scenes, by number of links: made once. @type {Record<number, HTMLElement>} */
 const galleries = {};
 
-/** @param {number} links */
 function gallery(links) {
   galleries[links] ??= el("div", {}, ...pictures(SCENES.filter(({ id }) => id in FAILING), links),
     el("details", {}, el("summary", {}, "All thirty-nine scenes"), ...pictures(SCENES.filter(({ id }) => !(id in FAILING)), links)));
@@ -685,7 +682,7 @@ async function measure() {
   look();
 }
 
-/** Draws the last seconds, or copies them. @param {string} name @param {import("./strip_chart.js").Series[]} series @param {{level?: number}} [more] */
+/** Draws the last seconds, or copies them. @param {string} name @param {import("./plots.js").Series[]} series @param {{level?: number}} [more] */
 function strip(name, series, more) {
   const chart = new StripChart(series, 0.2, 300);
   const view = () => ({ now: newest() || 0, span: SPAN, links: state.links, shown: ALL_JOINTS, across: "simulation time [s]", ...more });

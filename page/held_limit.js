@@ -71,7 +71,6 @@ function numbersIn(text) {
   return text.split(/[\s,;()[\]]+/).filter(Boolean).map(Number);
 }
 
-/** @param {any} values */
 function inWords({ period_limit: limit, explanation }) {
   const parts = inPageNames(explanation).replaceAll("kg m^2", "kg m²").split("; ");
   const figure = limit === 0 ? "none is stable" : limit === null ? "no limit was found" : limitText(limit);

@@ -8,16 +8,6 @@ import { isFree, loopKey, questionOf, stepsPerUpdate } from "./question.js";
 /** @typedef {import("./question.js").Gains} Gains */
 /** @typedef {import("./question.js").Live} State */
 /** @typedef {"offline" | "diverged" | "unknown" | "never" | "beyond" | "here" | "stable"} Kind */
-/**
- * @typedef {object} Verdict
- * @property {Kind} kind
- * @property {string} pill a few words
- * @property {string} sentence all of it
- * @property {number} limit limit of the timestep [s]: 0 if no stable one was found, Infinity if no limit was, NaN unknown
- * @property {number} advised timestep to offer [s]; NaN if there is none
- * @property {string} where the pose or speed of the limit
- * @property {boolean} slow whether the verdict is for a control period longer than the timestep
- */
 
 /** Below this real-time factor the runtime is too slow. */
 export const SLOW = 0.95;
@@ -185,7 +175,10 @@ export function periodText(state) {
   return [...often, ...(period.delay ? ["delayed"] : [])].join(", ");
 }
 
-/** @param {State} state @returns {Verdict} */
+/**
+ * The verdict in a few words and in a sentence; the limit [s] (0 if no stable time was found, Infinity if no limit was, NaN unknown), with its pose or
+ * speed; the timestep to offer [s], NaN for none; and whether all this is about a control period longer than the timestep. @param {State} state
+ */
 export function verdict(state) {
   const own = limitInForce(state);
   const integrator = judged(state);

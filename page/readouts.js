@@ -56,7 +56,6 @@ function showLimit() {
   byId("out-every").classList.toggle("warn", said.kind === "here");
 }
 
-/** The energy gain of a small free swing. */
 function growthText() {
   const { method, timestep } = state.integrator;
   const seconds = doublingTime(method, timestep, answerInForce(state));

@@ -272,7 +272,6 @@ export function enable(data) {
   return data === undefined ? call() : changing(call);
 }
 
-/** Stores `value` under `key`, and notifies only if it differs. */
 function keep(key, value) {
   if (JSON.stringify(state[key]) !== JSON.stringify(value)) set(key, value);
 }
@@ -363,7 +362,6 @@ const askNow = latestOnly(async () => {
   }
 }, STABILITY_MS);
 
-/** Asks, unless the answer is known. */
 function askStability() {
   if (questionOf(state) && bridge.open && !answerInForce(state)) askNow();
 }

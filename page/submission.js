@@ -30,7 +30,6 @@ export function startSubmission() {
   });
 }
 
-/** @param {File | undefined} file */
 async function open(file) {
   if (!file) return;
   const [words, poses = [], target] = file.size > MOST_BYTES ? [`not a submission: more than ${MOST_BYTES} bytes`] : await score(await file.arrayBuffer());

@@ -66,7 +66,6 @@ export class Surface {
     if (!isFirst) draw(performance.now());
   }
 
-  /** Fills it with the background's colour. */
   clear() {
     this.context.globalAlpha = 1;
     this.context.fillStyle = colors.panel;
@@ -95,7 +94,6 @@ export function wake() {
   requestAnimationFrame(draw);
 }
 
-/** @param {number} now */
 function draw(now) {
   asked = false;
   count.frames += 1;

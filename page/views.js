@@ -55,7 +55,6 @@ function startLinks() {
   byId("links").addEventListener("change", ({ target }) => chooseLinks(target.value));
 }
 
-/** @param {"course" | "workbench"} view */
 function show(view) {
   const links = linksInLink();
   if (view === "workbench" && stepIn(location.hash) >= 0) setAddress(`#${links || "workbench"}`, "pushState");

@@ -34,7 +34,7 @@ pub const ASSETS: &[Asset] = assets! {
     "field.js" "format.js" "held_limit.js" "history.js" "kernel.js" "keyboard.js" "ladder.js" "ladder_panel.js"
     "latest.js" "main.js" "mechanics.js" "motions.js" "packed.js" "plots.js" "policy.js" "question.js"
     "readouts.js" "realism.js" "responses.js" "rosbridge.js" "runtime.js" "scale.js" "scenes.js"
-    "settings.js" "sheet.js" "stability_panel.js" "store.js" "strip_chart.js" "study.js"
+    "settings.js" "sheet.js" "stability_panel.js" "store.js" "study.js"
     "submission.js" "surface.js" "tasks_panel.js" "theme.js" "transport.js" "views.js"
 };
 

@@ -60,10 +60,11 @@ INPUTS = (
 @needs_chromium("a script before those of the page")
 class Early(PageTest):
     def setUp(self):
-        self.begin()
+        pass  # each page has an arm of its own
 
     def early(self, script, view, until):
         """A page of a new arm, with a script before its own; in a panel, or in the course."""
+        self.begin()
         self.course = view == "course"
         page = self.visit("about:blank")
         page.before(script)
@@ -79,13 +80,12 @@ class Early(PageTest):
     def test_an_input_before_the_first_answers_is_not_lost(self):
         for act, wanted, view in INPUTS:
             with self.subTest(act):
-                self.begin()
                 page = self.early(HOLD, view, "$('#connection').className === 'pill open' && $('#kp-fields input') !== null")
                 # Both in one go, so that the input never waits for this program.
                 page.run(f"own('store.js').then(({{ state }}) => {{ window.state = state; {act}; setTimeout(release, 100); }})")
                 page.until(wanted, why=f"{wanted} after {act}")
                 self.assertEqual(page.complaints, [])
-                page.close()
+            self.doCleanups()
 
     @needs_server("no server, no connection that others could have or lose")
     def test_an_input_without_a_connection_says_so(self):
