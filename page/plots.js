@@ -106,10 +106,8 @@ const PIECES = 5; // the number of pieces of the path, which fades towards the p
 const SANE = 300; // beyond it the scales are logarithmic [rad, rad/s]
 
 class PhasePlot {
-  constructor() {
-    this.across = new Axis(4, 0.5, SANE);
-    this.axis = new Axis(4, 0.5, SANE);
-  }
+  across = new Axis(4, 0.5, SANE);
+  axis = new Axis(4, 0.5, SANE);
 
   /** @param {Surface} surface @param {{now: number, span: number, links: number, shown: boolean[], cursor?: number}} what */
   draw(surface, { now, span, links, shown, cursor = NaN }) {

@@ -120,11 +120,8 @@ function isSame(/** @type {Settings} */ one, /** @type {Settings | null} */ othe
 
 /** The settings before each change, the newest last. */
 export class Undo {
-  constructor() {
-    /** @type {Settings[]} */
-    this.past = [];
-    this.lastTime = -Infinity;
-  }
+  past = /** @type {Settings[]} */ ([]);
+  lastTime = -Infinity;
 
   /** Stores the present settings before a change at `now` [ms], unless the change continues the previous one. */
   remember(/** @type {Settings | null} */ present, /** @type {number} */ now) {
@@ -143,8 +140,7 @@ export class Undo {
   /** The settings to restore; undefined if there are none. */
   take(/** @type {Settings | null} */ present) {
     this.lastTime = -Infinity;
-    let settings = this.past.pop();
-    while (settings && isSame(settings, present)) settings = this.past.pop();
-    return settings;
+    while (this.past.length > 0 && isSame(this.past[this.past.length - 1], present)) this.past.pop();
+    return this.past.pop();
   }
 }

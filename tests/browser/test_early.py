@@ -16,6 +16,7 @@ for (const name of ["WebSocket", "Worker"]) window[name] = class extends window[
 };"""
 # No attempt to connect succeeds.
 REFUSE = "window.WebSocket = class { static OPEN = 1; constructor() { setTimeout(() => this.onclose(), 50); } };"
+MAP = "$('#map')"
 
 
 def key(name, place="document.body"):
@@ -34,7 +35,7 @@ def given(place, value, kind="change"):
 
 # The input, what it must lead to, and the panel in which it is, or the view.
 INPUTS = (
-    (key("ArrowUp", "$('#map')"), "state.gains?.kp[0] === 1100", "stability"),
+    (f"{key('ArrowUp', MAP)}, {key('ArrowUp', MAP)}", "state.gains?.kp[0] === 1210", "stability"),
     (pressed("#map", "click"), "state.integrator && state.integrator.timestep !== 0.001", "stability"),
     (given(f"#masses-fields {NUMBER}", "2"), "state.params?.masses[0] === 2", "plots"),
     (given("#kp-fields input[type=range]", "400", "input"), "state.gains?.kp[0] === 20000", "plots"),
@@ -90,7 +91,7 @@ class Early(PageTest):
     @needs_server("no server, no connection that others could have or lose")
     def test_an_input_without_a_connection_says_so(self):
         page = self.early(REFUSE, "stability", "$('#connection').className === 'pill lost'")
-        for act in (*(key(one) for one in "1jregascx. "), key("ArrowUp", "$('#map')"), key("ArrowLeft", "$('#arm')"), key("Escape", "$('#arm')"),
+        for act in (*(key(one) for one in "1jregascx. "), key("ArrowUp", MAP), key("ArrowLeft", "$('#arm')"), key("Escape", "$('#arm')"),
                     pressed("#map", "click"), pressed("#arm", "pointerdown", "pointerup"), "$('#pause').click()", "$('#reset').click()",
                     "$('#controller').click()", "$('#defaults').click()", "$('#suggest button').click()", "$('#share').click()",
                     "$('#compare-form button').click()", "$('#ladder-form button').click()", "$('#stability .robot').open = true"):
