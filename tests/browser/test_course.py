@@ -19,8 +19,8 @@ class CourseTest(PageTest):
         self.page.until("$('#course-start').textContent === 'Restart step'")
         self.page.until("!$('#course-dial').inert", why="the scene is set")
 
-    def done(self, why):
-        self.page.until("$('#course-task').className === 'done'", why=why)
+    def done(self, why, seconds=60):
+        self.page.until("$('#course-task').className === 'done'", seconds, why)
 
     def answer(self, text):
         self.page.press("#course-question", text)
@@ -356,7 +356,7 @@ class Access(CourseTest):
             time.sleep(0.3)
             if name == "own":
                 self.page.click("#own-form button")
-                self.done("a sheet")
+                self.done("a sheet", 300)
                 self.page.click("#course .robot summary")
             self.assertEqual(audit(self.page), [], f"step {number}")
             self.assertLessEqual(self.page.run("document.documentElement.scrollWidth"), self.page.width, f"step {number}")

@@ -52,7 +52,8 @@ INPUTS = (
     ("$('#compare-form button').click()", "!$('#compare-result').hidden", "compare"),
     (f"$('#ladder-form {NUMBER}').value = 0.1, $('#ladder-form button').click()", "$('#ladder-table tbody') !== null", "error"),
     ("$('#stability .robot').open = true", "$('#stability .robot textarea').value !== ''", "stability"),
-    (key("ArrowLeft", "$('#arm')"), "state.goal !== null", "plots"),
+    # The arm swings, so its left may be out of reach.
+    (key("ArrowLeft", "$('#arm')"), "state.goal !== null || $('#goal-body .refusal').textContent !== ''", "plots"),
     (pressed("#arm", "pointerdown", "pointerup"), "state.goal !== null", "plots"),
     ("$('#course-steps [data-step=slow]').click()", "$('#course-start').textContent === 'Restart step'", "course"),
 )

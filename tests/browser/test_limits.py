@@ -113,7 +113,7 @@ class BlowUp(PageTest):
         self.page.fill(f"#ladder-form {NUMBER}", "1")
         first = self.page.until(cell)
         self.page.fill(f"#ladder-form {NUMBER}", "60")
-        self.page.until("$('#ladder-text').textContent.startsWith('No run came within')")
+        self.page.until("$('#ladder-text').textContent.startsWith('No run came within')", 300)
         self.assertNotEqual(self.page.run(cell), first)
         self.page.expect_network_errors = True
         self.runtime.restart(links=3)
