@@ -26,16 +26,18 @@ FLAGS = [
 ANSWER_SECONDS = 60
 # Elements by a selector, as in a browser's console.
 CONSOLE = "globalThis.$ = (selector) => document.querySelector(selector), globalThis.$$ = (selector) => [...document.querySelectorAll(selector)];"
-# Width, height and RGBA of a canvas, the latter in base64, after the next frame, because the page says something before it draws it. A copy is read,
-# because a canvas that is read often complains.
-PICTURE = """new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))).then(() => {
-  const canvas = $("%s"), context = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
-  context.drawImage(canvas, 0, 0);
-  const { data, width, height } = context.getImageData(0, 0, canvas.width, canvas.height);
+# Width, height and RGBA of a PNG in base64, the latter in base64 too.
+DECODE = """(async () => {
+  const bytes = Uint8Array.from(atob("%s"), (one) => one.charCodeAt(0));
+  const picture = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+  const { width, height } = picture;
+  const context = new OffscreenCanvas(width, height).getContext("2d");
+  context.drawImage(picture, 0, 0);
+  const { data } = context.getImageData(0, 0, width, height);
   let text = "";
   for (let i = 0; i < data.length; i += 1 << 15) text += String.fromCharCode(...data.subarray(i, i + (1 << 15)));
   return [width, height, btoa(text)];
-})"""
+})()"""
 
 
 class BrowserError(Exception):
@@ -48,7 +50,7 @@ def close(one, other, tolerance=24):
 
 
 class Image:
-    """A picture of a canvas; `image[x, y]` is (red, green, blue)."""
+    """A picture that the browser has decoded; `image[x, y]` is (red, green, blue)."""
 
     def __init__(self, width, height, data):
         self.width, self.height, self.data = width, height, base64.b64decode(data)
@@ -295,8 +297,8 @@ class Page:
     def insert(self, text):
         self.send("Input.insertText", {"text": text})
 
-    def image(self, selector):
-        return Image(*self.run(PICTURE % selector))
+    def decode(self, png):
+        return Image(*self.run(DECODE % base64.b64encode(png).decode()))
 
     def screenshot(self, path=None, whole=False):
         """A PNG of the window or the whole page."""

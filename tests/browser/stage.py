@@ -4,6 +4,7 @@ Invariant: a test passes only if its page's console said nothing: no exception, 
 """
 
 import atexit
+import base64
 import functools
 import os
 import pathlib
@@ -125,7 +126,9 @@ class PageTest(unittest.TestCase):
         return self.page.screenshot(ARTEFACTS / f"{name}.png", **how)
 
     def image(self, selector):
-        return self.page.image(selector)
+        """A picture of a canvas after the next frame, because the page says something before it draws it."""
+        return self.page.decode(base64.b64decode(self.page.run(f"""new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))
+            .then(() => $('{selector}').toDataURL().split(',')[1])""")))
 
     def color(self, name):
         """A colour of the style sheet, in the theme that is on."""
