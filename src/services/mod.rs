@@ -20,7 +20,7 @@ macro_rules! object {
     }};
 }
 
-/// The writer of an answer: a function, or the members that an [`Echo`] shows of its values.
+/// The writer of an answer: a function, or the members that an `Echo` shows of its values.
 macro_rules! writer {
     (|$values:ident| { $($members:tt)* }) => {
         fn write(echo: Self::Answer, to: &$crate::services::Address) -> bytes::Bytes {
@@ -31,7 +31,7 @@ macro_rules! writer {
     ($($write:tt)*) => { $($write)* };
 }
 
-/// A request: its answer, its fields with the expression that reads each, and the [`writer`] of the answer. The fields of a
+/// A request: its answer, its fields with the expression that reads each, and the `writer` of the answer. The fields of a
 /// `whole` request are all valid, or it is rejected. Of the others each field is checked alone: an invalid one never
 /// prevents a valid one from taking effect, and the request has the rejections.
 macro_rules! request {

@@ -126,10 +126,7 @@ mod tests {
         for (target, node) in [
             ("pendularm::actors::arm::sim::node", "arm_sim"),
             ("pendularm::actors::arm::ik_action", "ik_action"),
-            (
-                "pendularm::actors::gateway::registry::forwarding",
-                "registry",
-            ),
+            ("pendularm::actors::gateway::registry::clients", "registry"),
             ("pendularm::actors::gateway::connection", "connection"),
             ("pendularm::actors::compute::workers", "workers"),
             ("pendularm::actors::runtime", "runtime"),
