@@ -156,7 +156,7 @@ def test_the_script_of_the_manual_solves_the_swing_up(tmp_path):
     (script,) = (part for part in re.findall("```python\n(.*?)```", manual, re.DOTALL) if "stable_baselines3" in part)
     run = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=600)
     assert run.returncode == 0, run.stderr
-    # A solved task has a mean return of over 170 of 200. A hanging arm has 0.
+    # The policies of the manual's tables have a mean return of 160 to 180. A hanging arm has 0.
     assert float(re.search(r"mean return ([0-9.]+)", run.stdout)[1]) > 165
     assert (tmp_path / "swing-up.zip").exists()
 
