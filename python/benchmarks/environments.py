@@ -4,7 +4,7 @@ It needs gymnasium and mujoco besides the wheel (`requirements.txt` in this fold
 three rounds, and the best round counts. The unit is processor time of this process, which other programs disturb less
 than clock time. A step of Acrobot is one of Runge-Kutta 4 over 0.2 s in Python. A step of pendularm and of MuJoCo is
 two over 0.025 s, except in the row `step(1, effort)`, where it is one. `rows` is a part of the rows' names, such as
-`Batch`; other rows are left out.
+`Batch`; other rows are left out, except the first one.
 """
 
 import os

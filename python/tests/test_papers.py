@@ -31,7 +31,8 @@ def test_the_readmes_plot_is_drawn(tmp_path):
 
 
 def test_each_part_of_the_manual_runs_by_itself(tmp_path):
-    said = "".join(run(part, tmp_path) for part in blocks(MANUAL))
+    # test_learning.py runs the part for stable-baselines3.
+    said = "".join(run(part, tmp_path) for part in blocks(MANUAL) if "stable_baselines3" not in part)
     assert "(20, 20, 2)" in said
     assert len(list((tmp_path / "gains").glob("*.npz"))) == 1
 
