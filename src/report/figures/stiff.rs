@@ -57,11 +57,11 @@ impl Cost {
         }
     }
 
-    /// Whether an implicit method takes less time than RK4.
+    /// Whether an implicit method takes at most half the time of RK4. Near the time of RK4 the order of the two is chance.
     fn is_implicit_faster(&self) -> bool {
         let [rk4, midpoint, rodas3] =
             (self.runs).map(|run| run.map_or(f64::INFINITY, |run| run.1.median));
-        midpoint.min(rodas3) < rk4
+        2.0 * midpoint.min(rodas3) <= rk4
     }
 }
 
@@ -208,7 +208,7 @@ fn finding(all: &[Costs], spring: &StiffScene) -> Option<String> {
         "**A 2-link swing of {DURATION} s from (0.4, -0.3), with a brake at the elbow {} times as fast as the swing, \
          costs Rodas3 {} evaluations within {} rad of the true motion, and RK4 at least {}**. Rodas3 is an implicit \
          method and a baseline of the report. RK4 is explicit and needs as many to be stable. An implicit method took \
-         less time than RK4 here from a ratio of {wins}. With 4 steps per period of an undamped spring, implicit midpoint \
+         at most half the time of RK4 here from a ratio of {wins}. With 4 steps per period of an undamped spring, implicit midpoint \
          keeps {} % of the energy of its motion, at a wrong frequency. RK4 and Rodas3 keep at most {} %.",
         power(last.scene.ratio.log10()),
         rodas3?.0.evaluations,
