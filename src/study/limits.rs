@@ -121,79 +121,116 @@ pub fn limits<const N: usize>(control: &ControlLoop<N>) -> Limits<N> {
 
 /// Does what [`limits`] does, in pieces.
 pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N> {
-    let method = control.method;
-    let (equilibrium, kind, linear) = settle(&control);
+    let (equilibrium, rest, linear) = settle(&control);
     pause().await;
-    let mut held = Stepping::of(&linear, &control, Sampling::Held).limit();
-    // A joint without a restoring force drifts, but a loop that is stable at some timestep is not unstable in
-    // continuous time.
-    let mut runs_away = held == Some(0.0) && Modes::of(&linear).run_away();
+    let held = Stepping::of(&linear, &control, Sampling::Held).limit();
     pause().await;
-    let continuous = largest_timestep(&linear, method, Sampling::Continuous);
+    let continuous = largest_timestep(&linear, control.method, Sampling::Continuous);
     pause().await;
     let here = PoseCandidate::as_it_is(equilibrium);
-    let (mut least, mut worst) = (held, here);
-    let (mut bound, mut runaway) = (None, None);
-    if let Some(Proven { timestep, pose }) = prove(&control, MAX_BOXES).await {
-        bound = Some(timestep);
-        // The pose at which the bound is tightest.
-        let nearest = PoseCandidate::as_it_is(pose);
-        let there = Stepping::of(&nearest.linear(&control), &control, Sampling::Held).limit();
-        if there.is_some_and(|there| there > 0.0 && least.is_none_or(|least| there < least)) {
-            (least, worst) = (there, nearest);
-        }
-        if held == Some(0.0) {
-            // When rates differ by a factor of a trillion, rounding alone can make slow modes seem to grow. The proof
-            // is not affected by this rounding.
-            (held, least, runs_away) = (bound, bound, false);
-        }
-    } else if control.integrating().contains(&true) && control.arm.gravity() > 0.0 {
-        let (found, pose) = smallest_of_all_poses(control, None, (None, here)).await;
-        runaway = found.map(|_| pose);
-    }
-    let mut agrees = is_near(bound, least);
-    if !agrees {
-        // All poses, or only those without gravity if some pose with gravity is unstable.
-        let mut searched = control;
-        if runaway.is_some() {
-            searched.arm = control.arm.weightless();
-        }
-        let known = (least, worst);
-        (least, worst) = smallest_of_all_poses(searched, Some(Sampling::Held), known).await;
-        agrees = is_near(bound, least);
-    }
-    let useful = bound.filter(|bound| least.is_some_and(|least| *bound >= USEFUL * least));
     let mut limits = Limits {
         equilibrium,
-        rest: if runs_away { Rest::Unstable } else { kind },
+        rest,
         held,
         continuous,
-        minimum_held: least,
+        minimum_held: None,
         minimum_continuous: Some(0.0),
-        bound: useful,
-        bound_is_proven: useful.is_some()
-            && (method == Method::Euler || control.arm.gravity() == 0.0),
-        certified: agrees,
+        bound: None,
+        bound_is_proven: false,
+        certified: false,
         worst_pose: None,
         critical: None,
         advised: None,
         period: control.given_period(),
     };
-    let part = runaway.map_or(ADVISED_PART, |_| SPINNING_PART);
-    limits.advised = limits.trusted().map(|limit| part * limit);
-    if let Some(pose) = runaway {
-        (least, worst) = (Some(0.0), pose);
-        limits.minimum_held = least;
+    if let Some(proven) = prove(&control, MAX_BOXES).await {
+        return with_bound(control, limits, proven).await;
     }
+    // A joint without a restoring force drifts, but a loop that is stable at some timestep is not unstable in
+    // continuous time.
+    if held == Some(0.0) && Modes::of(&linear).run_away() {
+        limits.rest = Rest::Unstable;
+    }
+    if let Some(pose) = runaway_pose(control, here).await {
+        // No timestep is stable there. The advice is for the poses without gravity.
+        let mut weightless = control;
+        weightless.arm = control.arm.weightless();
+        let search = smallest_of_all_poses(weightless, Some(Sampling::Held), (held, here));
+        let (least, _) = search.await;
+        return Limits {
+            minimum_held: Some(0.0),
+            worst_pose: Some(pose.pose),
+            critical: critical(&pose.linear(&control), &control, 0.0),
+            advised: least.map(|limit| SPINNING_PART * limit),
+            ..limits
+        };
+    }
+    let search = smallest_of_all_poses(control, Some(Sampling::Held), (held, here));
+    with_smallest(control, limits, search.await).await
+}
+
+/// The limits of a loop with a bound for all poses.
+async fn with_bound<const N: usize>(
+    control: ControlLoop<N>,
+    mut limits: Limits<N>,
+    Proven { timestep, pose }: Proven<N>,
+) -> Limits<N> {
+    let bound = Some(timestep);
+    let mut smallest = (limits.held, PoseCandidate::as_it_is(limits.equilibrium));
+    // The pose at which the bound is tightest.
+    let nearest = PoseCandidate::as_it_is(pose);
+    let there = Stepping::of(&nearest.linear(&control), &control, Sampling::Held).limit();
+    let is_less = |there| there > 0.0 && limits.held.is_none_or(|held| there < held);
+    if there.is_some_and(is_less) {
+        smallest = (there, nearest);
+    }
+    if limits.held == Some(0.0) {
+        // When rates differ by a factor of a trillion, rounding alone can make slow modes seem to grow. The proof
+        // is not affected by this rounding.
+        limits.held = bound;
+        smallest.0 = bound;
+    }
+    if !is_near(bound, smallest.0) {
+        smallest = smallest_of_all_poses(control, Some(Sampling::Held), smallest).await;
+    }
+    let least = smallest.0;
+    limits.certified = is_near(bound, least);
+    limits.bound = bound.filter(|bound| least.is_some_and(|least| *bound >= USEFUL * least));
+    limits.bound_is_proven =
+        limits.bound.is_some() && (control.method == Method::Euler || control.arm.gravity() == 0.0);
+    with_smallest(control, limits, smallest).await
+}
+
+/// The limits with the smallest one over all poses, and its pose.
+async fn with_smallest<const N: usize>(
+    control: ControlLoop<N>,
+    mut limits: Limits<N>,
+    (least, worst): (Option<f64>, PoseCandidate<N>),
+) -> Limits<N> {
+    limits.minimum_held = least;
     limits.worst_pose = least.map(|_| worst.pose);
     limits.critical = least.and_then(|limit| critical(&worst.linear(&control), &control, limit));
-    if runaway.is_some() {
-        return limits;
-    }
+    limits.advised = limits.trusted().map(|limit| ADVISED_PART * limit);
     pause().await;
-    let search = smallest_of_all_poses(control, Some(Sampling::Continuous), (continuous, here));
+    let known = (
+        limits.continuous,
+        PoseCandidate::as_it_is(limits.equilibrium),
+    );
+    let search = smallest_of_all_poses(control, Some(Sampling::Continuous), known);
     (limits.minimum_continuous, _) = search.await;
     limits
+}
+
+/// A pose at which the loop is unstable at every timestep, if an integral makes it so under gravity.
+async fn runaway_pose<const N: usize>(
+    control: ControlLoop<N>,
+    here: PoseCandidate<N>,
+) -> Option<PoseCandidate<N>> {
+    if !control.integrating().contains(&true) || control.arm.gravity() <= 0.0 {
+        return None;
+    }
+    let (found, pose) = smallest_of_all_poses(control, None, (None, here)).await;
+    found.map(|_| pose)
 }
 
 /// The equilibrium, its kind, and the linearised loop there.
