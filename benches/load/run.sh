@@ -83,7 +83,7 @@ await "$bare_port" bare
 folder=$(results_folder)/load
 mkdir -p "$folder"
 {
-    environment "make bench-load"
+    environment "make bench-load${ARGS:+ ARGS=$ARGS}"
     echo "pinned:    servers by ${pin[*]:-nothing}, client by ${pin_others[*]:-nothing}"
     echo "peers:     $(redis-server --version | sed 's/ sha=.*//'); $(mosquitto -h | sed -n 1p)"
 } | tee "$folder/environment.txt"
