@@ -100,7 +100,7 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
     let verdicts = sections.iter().flat_map(|section| &section.verdicts);
     let short = verdicts.filter(|verdict| !verdict.holds).count();
     say(&format!(
-        "report: {} ({short} verdicts do not hold)",
+        "report: {} (verdicts that do not hold: {short})",
         page.display()
     ));
     Ok(page)
