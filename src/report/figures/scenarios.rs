@@ -65,8 +65,8 @@ pub(super) fn make(section: &mut Section) {
         "The stiff and extreme scenes, each as one live arm",
         "Joint angles from their start, by the live arm's own steps. The scale is that of the largest angle, which is \
          written below. A cross marks the end of a run that diverged. Below: the duration, the largest angle, and \
-         whether the scene agrees with theory; the table has the details. The step Stiff and extreme of the page runs \
-         each of them.",
+         whether the scene is as expected; the table has the details. The step Stiff and extreme of the page has \
+         all but S36.",
         &panels,
     );
     section.table(&table);
