@@ -5,7 +5,7 @@ import { announce, byId, passFocus, warn } from "./dom.js";
 import { inPageNames } from "./format.js";
 import { change, enable, GROUPS, pause, reset, sendSetpoint, setState } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
-import { known, settingsKnown, state, tell, watch } from "./store.js";
+import { known, settingsKnown, state, tell, unknown, watch } from "./store.js";
 
 const undo = new Undo();
 let applying = false;
@@ -26,7 +26,7 @@ export function startActions() {
   byId("undo").addEventListener("click", takeBack);
   byId("defaults").addEventListener("click", async () => {
     const links = await known(settingsKnown);
-    if (links === null) return warn("not connected");
+    if (links === null) return warn(unknown().status);
     remember();
     report(await apply(DEFAULTS[links]), "All settings are the defaults again.");
   });
